@@ -1,0 +1,184 @@
+"""The beam: cells of the water refracted at their corners, their light deposited by exact overlap with the pixels.
+
+Two passes over a strip of the lattice: :func:`make_corners` lands the corners, with a border of one more, into planes
+of numbers; :func:`make_cells` deposits each cell as triangles, cut finer where its landing map bends. Cells whose
+corners met different fates are only flagged here: :mod:`.torn` follows them ray by ray.
+
+Planes, each [rows, columns] of corners: deviation x, deviation y [pixels]; incident flux; with Fresnel the transmitted
+flux; with attenuation the arrived flux of each channel.
+"""
+
+import functools
+
+import warp as wp
+
+from .deposit import ACCUMULATOR, FLUX
+from .lattice import Lattice, at_rest, deviation, on_water, pixel_base, pixel_fraction, to_rest
+from .ledger import ABSORBED, EMITTED, OUTSIDE_MAP, REFLECTED, make_count_unlanded, tally
+from .patch import BORDER, arrived_plane, integral_weights, make_deposit_patch, plane_bend, plane_mean
+from .photon import LANDED, LANDED_ON_OBJECT, Scene, SunSample, make_photon
+from .spec import Spec
+
+BEND_TOLERANCE = 0.01
+"""Bend of the landing map [pixels] that is left inside one part of a cell."""
+
+FINEST = 8
+"""Parts of a cell along each side at most."""
+
+TORN_BEND = 1.0
+"""Bend [pixels] past which a cell over a receiver with edges is followed ray by ray instead of interpolated."""
+
+
+@functools.cache
+def make_corners(spec: Spec) -> wp.Kernel:
+    """Land the corners of a strip."""
+    photon = make_photon(spec)
+    fresnel, breaks = spec.fresnel, spec.breaks
+    absorbs = spec.attenuation != "none"
+    channels = spec.channels
+    arrived = arrived_plane(spec)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def corners(
+        # In:
+        scene: Scene,
+        suns: wp.array[SunSample],
+        sun: int,
+        lattice: Lattice,
+        first_row: int,
+        # Out:
+        planes_out: wp.array3d[float],
+        state_out: wp.array2d[wp.uint8],
+    ):
+        """One thread a corner of the strip with its border; launch dims (rows, columns) of corners."""
+        row, column = wp.tid()
+        light = suns[sun]
+        index = wp.vec2i(lattice.first[0] + column - wp.static(BORDER), first_row + row - wp.static(BORDER))
+        water = on_water(lattice, at_rest(lattice, index, 0.0), light.rest_shift)
+        result = photon(scene, light.direction, water[0], water[1])
+        offset = deviation(lattice, result.distance, result.direction, light.rest_shift)
+        planes_out[0, row, column] = offset[0]
+        planes_out[1, row, column] = offset[1]
+        planes_out[2, row, column] = result.incident
+        if wp.static(fresnel):
+            planes_out[3, row, column] = result.transmitted
+        if wp.static(absorbs):
+            for c in range(wp.static(channels)):
+                planes_out[wp.static(arrived) + c, row, column] = result.arrived[c]
+        if wp.static(breaks):
+            state_out[row, column] = wp.uint8(result.state)
+
+    return corners
+
+
+@wp.func
+def common_state(state: wp.array2d[wp.uint8], row: int, column: int, first: int, count: int) -> int:
+    """The state that a square of corners shares, or 0; (row + first, column + first) is its first corner."""
+    common = int(state[row + first, column + first])
+    for j in range(first, first + count):
+        for i in range(first, first + count):
+            if int(state[row + j, column + i]) != common:
+                common = int(0)
+    return common
+
+
+@functools.cache
+def make_book_landed(spec: Spec) -> wp.Function:
+    """Enter a landed cell into the ledger: what it took in, what it lost on the way, what fell outside the map."""
+    flux_type = FLUX[spec.channels]
+    channels = spec.channels
+
+    @wp.func
+    def book_landed(
+        ledger: wp.array2d[wp.float64], bin: int, incident: float, transmitted: float, arrived: flux_type,
+        inside: flux_type,
+    ):  # fmt: skip
+        for c in range(wp.static(channels)):
+            tally(ledger, EMITTED * wp.static(channels) + c, bin, incident)
+            tally(ledger, REFLECTED * wp.static(channels) + c, bin, incident - transmitted)
+            tally(ledger, ABSORBED * wp.static(channels) + c, bin, transmitted - arrived[c])
+            tally(ledger, OUTSIDE_MAP * wp.static(channels) + c, bin, arrived[c] - inside[c])
+
+    return book_landed
+
+
+@functools.cache
+def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
+    """Deposit the cells of a strip."""
+    deposit_patch = make_deposit_patch(spec)
+    book_landed = make_book_landed(spec)
+    count_unlanded = make_count_unlanded(spec)
+    dtype = ACCUMULATOR[spec.accumulate]
+    flux_type = FLUX[spec.channels]
+    channels, breaks, bounded = spec.channels, spec.breaks, spec.bounded
+    edges = spec.tears or spec.objects or spec.receiver == "mesh"
+    transmitted_plane = 2 + int(spec.fresnel)
+    arrived = arrived_plane(spec)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def cells(
+        # In:
+        suns: wp.array[SunSample],
+        sun: int,
+        lattice: Lattice,
+        first_row: int,
+        planes: wp.array3d[float],
+        state: wp.array2d[wp.uint8],
+        # Out:
+        torn_cells_out: wp.array2d[wp.uint8],
+        map_out: wp.array[dtype],
+        ledger_out: wp.array2d[wp.float64],
+    ):
+        """One thread a cell of the strip; launch dims (rows, columns) of cells."""
+        row, column = wp.tid()
+        shift = suns[sun].rest_shift
+        index = wp.vec2i(lattice.first[0] + column, first_row + row)
+        low = at_rest(lattice, index, 0.0)
+        high = at_rest(lattice, index, 1.0)
+        base = pixel_base(low)
+        cubic = int(wp.static(int(refine)))
+        if wp.static(bounded):
+            # A cell that the water's border cuts keeps what is left of it, without the neighbours' cubic.
+            before = to_rest(lattice, on_water(lattice, at_rest(lattice, index, -1.0), shift), shift)
+            after = to_rest(lattice, on_water(lattice, at_rest(lattice, index, 2.0), shift), shift)
+            low = to_rest(lattice, on_water(lattice, low, shift), shift)
+            high = to_rest(lattice, on_water(lattice, high, shift), shift)
+            uncut = 2.99 * lattice.step
+            if after[0] - before[0] < uncut or after[1] - before[1] < uncut:
+                cubic = int(0)
+            if high[0] <= low[0] or high[1] <= low[1]:
+                torn_cells_out[row, column] = wp.uint8(0)
+                return
+        common = int(LANDED)
+        if wp.static(breaks):
+            common = common_state(state, row, column, 1, 2)
+            if common_state(state, row, column, 0, 4) == 0:
+                cubic = int(0)
+        n = int(1)
+        if wp.static(refine):
+            bend = float(0.0)
+            if cubic == 1:
+                bend = wp.max(plane_bend(planes, 0, row, column), plane_bend(planes, 1, row, column))
+            n = wp.clamp(int(wp.ceil(wp.sqrt(bend / wp.static(BEND_TOLERANCE)))), 1, wp.static(FINEST))
+            if wp.static(edges):
+                if bend > wp.static(TORN_BEND):
+                    common = int(0)
+        if wp.static(breaks):
+            torn_cells_out[row, column] = wp.uint8(wp.where(common == 0, 1, 0))
+        bin = row * 31 + column
+        weights = integral_weights(cubic)
+        share = (high[0] - low[0]) * (high[1] - low[1]) / (lattice.step * lattice.step)
+        incident = share * plane_mean(planes, 2, row, column, weights)
+        transmitted = share * plane_mean(planes, wp.static(transmitted_plane), row, column, weights)
+        if common == LANDED or common == LANDED_ON_OBJECT:
+            mean = flux_type()
+            for c in range(wp.static(channels)):
+                mean[c] = plane_mean(planes, wp.static(arrived) + c, row, column, weights)
+            inside = deposit_patch(
+                map_out, lattice, base, pixel_fraction(low, base), high - low, planes, row, column, n, cubic, mean
+            )
+            book_landed(ledger_out, bin, incident, transmitted, share * mean, inside)
+        elif common != 0:
+            count_unlanded(ledger_out, bin, common, incident, transmitted)
+
+    return cells

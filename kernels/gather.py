@@ -1,0 +1,140 @@
+"""Yuksel & Keyser's gather: intersections, pass 1 along rows, pass 2 along columns.
+
+As published, with the errata mended: the illumination centre is P_C = P_G - h R0_xy / |R0_z|, channels are counted
+from zero, and pass 2 fetches channel j from j - M/2 rows above. The lattice of the intersections is the map's own
+pixels with a border of half a window; the lattice's anchor makes each pixel's illumination centre its own cell.
+"""
+
+import functools
+
+import warp as wp
+
+from .beam import make_book_landed
+from .deposit import FLUX
+from .lattice import Lattice, at_rest, deviation, on_water
+from .ledger import make_count_unlanded
+from .photon import LANDED, Scene, SunSample, make_photon
+from .spec import Spec
+
+
+@wp.func
+def box_overlap(distance: float) -> float:
+    """Overlap of two unit intervals whose middles are this far apart (the paper's ax and ay)."""
+    return wp.max(0.0, 1.0 - wp.abs(distance))
+
+
+@functools.cache
+def make_intersections(spec: Spec) -> wp.Kernel:
+    """The pre-pass: where the light of each sample lands, and how much of it there is."""
+    photon = make_photon(spec)
+    book_landed = make_book_landed(spec)
+    count_unlanded = make_count_unlanded(spec)
+    flux_type = FLUX[spec.channels]
+    channels, bounded = spec.channels, spec.bounded
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def intersections(
+        # In:
+        scene: Scene,
+        suns: wp.array[SunSample],
+        sun: int,
+        lattice: Lattice,
+        # Out:
+        landing_out: wp.array2d[wp.vec2],
+        flux_out: wp.array2d[flux_type],
+        ledger_out: wp.array2d[wp.float64],
+    ):
+        """One thread a sample; launch dims (rows, columns) of the lattice; landings in pixels from the sample's own."""
+        row, column = wp.tid()
+        light = suns[sun]
+        index = wp.vec2i(lattice.first[0] + column, lattice.first[1] + row)
+        rest = at_rest(lattice, index, 0.5)
+        water = on_water(lattice, rest, light.rest_shift)
+        result = photon(scene, light.direction, water[0], water[1])
+        offset = deviation(lattice, result.distance, result.direction, light.rest_shift)
+        flux = flux_type()
+        inside = box_inside(float(index[0]) + 0.5 + offset[0], lattice.map[0])
+        inside *= box_inside(float(index[1]) + 0.5 + offset[1], lattice.map[1])
+        on_the_water = int(1)
+        if wp.static(bounded):
+            beside = wp.vec2(rest[0] * lattice.pixel[0], rest[1] * lattice.pixel[1]) - light.rest_shift
+            if wp.length(water - beside) > 0.5 * lattice.step * wp.min(lattice.pixel[0], lattice.pixel[1]):
+                on_the_water = int(0)
+        if on_the_water == 1:
+            if result.state == LANDED:
+                for c in range(wp.static(channels)):
+                    flux[c] = result.arrived[c]
+                book_landed(ledger_out, row * 31 + column, result.incident, result.transmitted, flux, inside * flux)
+            else:
+                count_unlanded(ledger_out, row * 31 + column, result.state, result.incident, result.transmitted)
+        landing_out[row, column] = offset
+        flux_out[row, column] = flux
+
+    return intersections
+
+
+@wp.func
+def box_inside(middle: float, count: int) -> float:
+    """Share of a unit interval around ``middle`` that lies in [0, count]."""
+    return wp.max(0.0, wp.min(middle + 0.5, float(count)) - wp.max(middle - 0.5, 0.0))
+
+
+@functools.cache
+def make_rows(channels: int) -> wp.Kernel:
+    """Pass 1: what the n samples beside a pixel, in its row, give to the m + 1 pixels of its column around it."""
+    flux_type = FLUX[channels]
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def rows(
+        # In:
+        landing: wp.array2d[wp.vec2],
+        flux: wp.array2d[flux_type],
+        n: int,
+        m: int,
+        # Out:
+        channel_out: wp.array3d[flux_type],
+    ):
+        """One thread a pixel of a column of the map that reaches m / 2 rows past it; launch dims (rows, columns).
+
+        ``channel_out[j, row, column]`` is what row ``row`` gives to the pixel ``j - m / 2`` rows above it.
+        """
+        row, column = wp.tid()
+        for j in range(m + 1):
+            channel_out[j, row, column] = flux_type()
+        for i in range(n):
+            sample = landing[row, column + i]
+            ax = box_overlap(sample[0] + float(i - n // 2))
+            if ax > 0.0:
+                light = ax * flux[row, column + i]
+                for j in range(m + 1):
+                    ay = box_overlap(sample[1] - float(j - m // 2))
+                    if ay > 0.0:
+                        channel_out[j, row, column] = channel_out[j, row, column] + ay * light
+
+    return rows
+
+
+@functools.cache
+def make_columns(channels: int) -> wp.Kernel:
+    """Pass 2: a pixel adds up what the rows around it have for it."""
+    flux_type = FLUX[channels]
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def columns(
+        # In:
+        channel: wp.array3d[flux_type],
+        m: int,
+        # Out:
+        map_out: wp.array[float],
+    ):
+        """One thread a pixel of the map; launch dims (rows, columns)."""
+        row, column = wp.tid()
+        total = flux_type()
+        for j in range(m + 1):
+            # Row r of the channels is map row r - m / 2: what lies j - m / 2 below gives through channel j.
+            total += channel[j, row + m - j, column]
+        at = (row * channel.shape[2] + column) * wp.static(channels)
+        for c in range(wp.static(channels)):
+            map_out[at + c] = map_out[at + c] + total[c]
+
+    return columns

@@ -1,0 +1,98 @@
+"""Height maps: bicubic Hermite patches between nodes that hold the height and its differences.
+
+A node holds ``(z, z_u, z_v, z_uv)``, the derivatives by node spacing, made on the host in float64 by fourth-order
+differences. The patch is C1, so the slope is continuous and consistent with the height.
+"""
+
+import warp as wp
+
+from .waves import vec6
+
+
+@wp.struct
+class Grid:
+    """Nodes of a height map; node (0, 0) stands at ``origin``, metres from the map's origin."""
+
+    nodes: wp.array2d[wp.vec4]
+    origin: wp.vec2  # [m]
+    per_metre: wp.vec2  # nodes per metre
+
+
+@wp.func
+def hermite(t: float) -> wp.vec4:
+    """Weights of (value 0, value 1, slope 0, slope 1) in the cubic on [0, 1]."""
+    s = 1.0 - t
+    return wp.vec4(s * s * (1.0 + 2.0 * t), t * t * (3.0 - 2.0 * t), t * s * s, -t * t * s)
+
+
+@wp.func
+def hermite_first(t: float) -> wp.vec4:
+    """First derivative of :func:`hermite`'s weights."""
+    return wp.vec4(6.0 * t * (t - 1.0), 6.0 * t * (1.0 - t), (3.0 * t - 1.0) * (t - 1.0), t * (3.0 * t - 2.0))
+
+
+@wp.func
+def hermite_second(t: float) -> wp.vec4:
+    """Second derivative of :func:`hermite`'s weights."""
+    return wp.vec4(12.0 * t - 6.0, 6.0 - 12.0 * t, 6.0 * t - 4.0, 6.0 * t - 2.0)
+
+
+@wp.func
+def patch(grid: Grid, row: int, column: int, u: wp.vec4, v: wp.vec4) -> float:
+    """Tensor product of the weights ``u`` along x and ``v`` along y over the patch at (row, column)."""
+    a = grid.nodes[row, column]
+    b = grid.nodes[row, column + 1]
+    c = grid.nodes[row + 1, column]
+    d = grid.nodes[row + 1, column + 1]
+    values = v[0] * (u[0] * a[0] + u[1] * b[0] + u[2] * a[1] + u[3] * b[1])
+    values += v[1] * (u[0] * c[0] + u[1] * d[0] + u[2] * c[1] + u[3] * d[1])
+    values += v[2] * (u[0] * a[2] + u[1] * b[2] + u[2] * a[3] + u[3] * b[3])
+    values += v[3] * (u[0] * c[2] + u[1] * d[2] + u[2] * c[3] + u[3] * d[3])
+    return values
+
+
+@wp.func
+def grid_cell(position: float, count: int) -> int:
+    """The patch that holds a position in node units; bounded, NaN included."""
+    return wp.clamp(int(wp.floor(position)), 0, count - 2)
+
+
+@wp.func
+def grid_sum(grid: Grid, x: float, y: float) -> wp.vec3:
+    """Height and slope (z, z_x, z_y) of the height map at (x, y); half a node past the last one at its border."""
+    nx = grid.nodes.shape[1]
+    ny = grid.nodes.shape[0]
+    px = wp.clamp((x - grid.origin[0]) * grid.per_metre[0], -0.5, float(nx) - 0.5)
+    py = wp.clamp((y - grid.origin[1]) * grid.per_metre[1], -0.5, float(ny) - 0.5)
+    column = grid_cell(px, nx)
+    row = grid_cell(py, ny)
+    u = px - float(column)
+    v = py - float(row)
+    return wp.vec3(
+        patch(grid, row, column, hermite(u), hermite(v)),
+        patch(grid, row, column, hermite_first(u), hermite(v)) * grid.per_metre[0],
+        patch(grid, row, column, hermite(u), hermite_first(v)) * grid.per_metre[1],
+    )
+
+
+@wp.func
+def grid_sum_curved(grid: Grid, x: float, y: float) -> vec6:
+    """Height, slope and second derivatives (z, z_x, z_y, z_xx, z_xy, z_yy) of the height map at (x, y)."""
+    nx = grid.nodes.shape[1]
+    ny = grid.nodes.shape[0]
+    px = wp.clamp((x - grid.origin[0]) * grid.per_metre[0], -0.5, float(nx) - 0.5)
+    py = wp.clamp((y - grid.origin[1]) * grid.per_metre[1], -0.5, float(ny) - 0.5)
+    column = grid_cell(px, nx)
+    row = grid_cell(py, ny)
+    u = px - float(column)
+    v = py - float(row)
+    mx = grid.per_metre[0]
+    my = grid.per_metre[1]
+    return vec6(
+        patch(grid, row, column, hermite(u), hermite(v)),
+        patch(grid, row, column, hermite_first(u), hermite(v)) * mx,
+        patch(grid, row, column, hermite(u), hermite_first(v)) * my,
+        patch(grid, row, column, hermite_second(u), hermite(v)) * mx * mx,
+        patch(grid, row, column, hermite_first(u), hermite_first(v)) * mx * my,
+        patch(grid, row, column, hermite(u), hermite_second(v)) * my * my,
+    )

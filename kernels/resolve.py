@@ -1,0 +1,83 @@
+"""From accumulators to the caustic map: lanes added up, scaled to irradiance, dry land lit directly."""
+
+import functools
+
+import warp as wp
+
+from .deposit import ACCUMULATOR
+from .photon import Scene, SunSample, share_lit
+from .spec import Spec
+from .surface import HEIGHT_AND_SLOPE
+
+DRY_PARTS = 4
+"""Parts of a pixel along each side in which its dry share is taken."""
+
+
+@functools.cache
+def make_resolve(accumulate: str, channels: int, colours: int) -> wp.Kernel:
+    """Add the lanes' maps and scale them to irradiance; ``colours`` of the map share ``channels`` of transport."""
+    dtype = ACCUMULATOR[accumulate]
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def resolve(
+        # In:
+        lanes: wp.array2d[dtype],
+        scale: wp.vec3d,
+        # Out:
+        map_out: wp.array[float],
+    ):
+        """One thread a value of the map; launch dim pixels * colours."""
+        i = wp.tid()
+        pixel = i // wp.static(colours)
+        colour = i - pixel * wp.static(colours)
+        at = pixel * wp.static(channels) + wp.where(wp.static(channels) == 1, 0, colour)
+        total = wp.float64(0.0)
+        for lane in range(lanes.shape[0]):
+            total += wp.float64(lanes[lane, at])
+        map_out[i] = float(total * scale[colour])
+
+    return resolve
+
+
+@functools.cache
+def make_dry_land(spec: Spec) -> wp.Kernel:
+    """Light dry land directly: E max(0, -I_z + z_x I_x + z_y I_y) on the part of a pixel that is dry."""
+    water_at = HEIGHT_AND_SLOPE[spec.water]
+    terrain_at = HEIGHT_AND_SLOPE[spec.receiver if spec.receiver in HEIGHT_AND_SLOPE else "waves"]
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def dry_land(
+        # In:
+        scene: Scene,
+        suns: wp.array[SunSample],
+        pixel: wp.vec2,
+        columns: int,
+        irradiance: wp.vec3,
+        colours: int,
+        # Out:
+        map_out: wp.array[float],
+        dry_out: wp.array[wp.float64],
+    ):
+        """One thread a pixel; launch dims (rows, columns)."""
+        row, column = wp.tid()
+        part = wp.vec2(pixel[0] / float(wp.static(DRY_PARTS)), pixel[1] / float(wp.static(DRY_PARTS)))
+        light = float(0.0)
+        for j in range(wp.static(DRY_PARTS)):
+            for i in range(wp.static(DRY_PARTS)):
+                x = float(column) * pixel[0] + (float(i) + 0.5) * part[0]
+                y = float(row) * pixel[1] + (float(j) + 0.5) * part[1]
+                ground = terrain_at(scene.receiver.terrain, x, y)
+                water = water_at(scene.water.surface, x, y)
+                dry = share_lit(ground[0] - water[0], wp.vec2(ground[1] - water[1], ground[2] - water[2]), part)
+                if dry > 0.0:
+                    for k in range(suns.shape[0]):
+                        sun = suns[k].direction
+                        light += dry * wp.max(0.0, ground[1] * sun[0] + ground[2] * sun[1] - sun[2])
+        light /= float(suns.shape[0]) * float(wp.static(DRY_PARTS)) * float(wp.static(DRY_PARTS))
+        if light > 0.0:
+            for c in range(colours):
+                at = (row * columns + column) * colours + c
+                map_out[at] = map_out[at] + light * irradiance[c]
+                wp.atomic_add(dry_out, c, wp.float64(light * irradiance[c]))
+
+    return dry_land

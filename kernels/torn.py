@@ -1,0 +1,150 @@
+"""Torn cells: those whose corners met different fates, followed ray by ray.
+
+A cell at a shore, a shadow's edge, the rim of an object or the crest of a hill is cut into equal parts. Each part is
+one ray through its middle, and lands as the parallelogram in which its own beam, by the curvature of the water, cuts
+the receiver's tangent plane at the hit: no streak can reach across the edge, and no energy is lost on it. An edge of
+light or of water that passes through a part takes its share of it.
+"""
+
+import functools
+
+import warp as wp
+
+from .beam import make_book_landed
+from .coverage import make_deposit_triangle
+from .deposit import ACCUMULATOR, FLUX
+from .lattice import Lattice, at_rest, on_water, pixel_base, pixel_fraction, to_rest
+from .ledger import EMITTED, OVER_LIT, SHADED, make_count_unlanded, tally
+from .optics import facing, refract_at_slope
+from .photon import LANDED, LANDED_ON_OBJECT, LOST, Photon, Scene, SunSample, make_land, make_lit, make_wet
+from .spec import Spec
+from .surface import HEIGHT_SLOPE_AND_CURVATURE
+from .waves import vec6
+
+PARTS = 4
+"""Parts of a torn cell along each side: its edges, a few pixels in a hundred, are right to 1/16 of a cell."""
+
+WIDEST = 8.0
+"""Widest footprint of a part, in cells: past it the tangent plane is nearly along the ray, and a point serves."""
+
+
+@wp.func
+def footprint_corner(
+    scene: Scene, sun: wp.vec3, photon: Photon, z: vec6, dx: float, dy: float
+) -> wp.vec2:
+    """Where the ray from (dx, dy) [m] beside a photon's origin cuts the receiver's tangent plane, from its landing."""
+    slope = wp.vec2(z[1] + z[3] * dx + z[4] * dy, z[2] + z[4] * dx + z[5] * dy)
+    direction = refract_at_slope(sun, slope, scene.medium.eta)
+    start = wp.vec3(dx, dy, 0.5 * ((z[1] + slope[0]) * dx + (z[2] + slope[1]) * dy))
+    landing = photon.distance * photon.direction
+    t = wp.dot(landing - start, photon.normal) / wp.dot(direction, photon.normal)
+    p = start + t * direction - landing
+    return wp.vec2(p[0], p[1])
+
+
+@functools.cache
+def make_torn(spec: Spec) -> wp.Kernel:
+    """Deposit the flagged cells of a strip."""
+    water_at = HEIGHT_SLOPE_AND_CURVATURE[spec.water]
+    lit = make_lit(spec)
+    wet = make_wet(spec)
+    land = make_land(spec)
+    deposit_triangle = make_deposit_triangle(spec.accumulate, spec.channels)
+    book_landed = make_book_landed(spec)
+    count_unlanded = make_count_unlanded(spec)
+    dtype = ACCUMULATOR[spec.accumulate]
+    flux_type = FLUX[spec.channels]
+    channels, self_shadow = spec.channels, spec.self_shadow
+
+    @wp.func
+    def deposit_part(
+        scene: Scene, sun: SunSample, lattice: Lattice, low: wp.vec2, high: wp.vec2,
+        map: wp.array[dtype], ledger: wp.array2d[wp.float64], bin: int,
+    ):  # fmt: skip
+        """``low`` and ``high`` bound the part, in pixels at rest."""
+        middle = 0.5 * (low + high)
+        water = on_water(lattice, middle, sun.rest_shift)
+        size = wp.vec2((high[0] - low[0]) * lattice.pixel[0], (high[1] - low[1]) * lattice.pixel[1])
+        z = water_at(scene.water.surface, water[0], water[1])
+        origin = wp.vec3(water[0], water[1], z[0])
+        slope = wp.vec2(z[1], z[2])
+        share = (high[0] - low[0]) * (high[1] - low[1]) / (lattice.step * lattice.step)
+        share *= wet(scene.receiver, origin, slope, size)
+        incident = facing(sun.direction, slope)
+        if incident <= 0.0:
+            if wp.static(not self_shadow):
+                for k in range(wp.static(channels)):
+                    tally(ledger, OVER_LIT * wp.static(channels) + k, bin, -incident * share)
+            return
+        if not share > 0.0:
+            return
+        in_sun = lit(scene, sun.direction, origin, slope, size)
+        for k in range(wp.static(channels)):
+            tally(ledger, EMITTED * wp.static(channels) + k, bin, incident * share * (1.0 - in_sun))
+            tally(ledger, SHADED * wp.static(channels) + k, bin, incident * share * (1.0 - in_sun))
+        if in_sun <= 0.0:
+            return
+        share *= in_sun
+        photon = land(scene, sun.direction, origin, slope, incident)
+        if photon.state != LANDED and photon.state != LANDED_ON_OBJECT:
+            count_unlanded(ledger, bin, photon.state, share * photon.incident, share * photon.transmitted)
+            return
+        landing = wp.vec2(
+            (water[0] + photon.distance * photon.direction[0]) / lattice.pixel[0],
+            (water[1] + photon.distance * photon.direction[1]) / lattice.pixel[1],
+        )
+        base = pixel_base(landing)
+        at = pixel_fraction(landing, base)
+        u = 0.5 * size[0]
+        v = 0.5 * size[1]
+        a = footprint_corner(scene, sun.direction, photon, z, -u, -v)
+        b = footprint_corner(scene, sun.direction, photon, z, u, -v)
+        c = footprint_corner(scene, sun.direction, photon, z, u, v)
+        d = footprint_corner(scene, sun.direction, photon, z, -u, v)
+        reach = wp.max(wp.max(wp.length(a), wp.length(b)), wp.max(wp.length(c), wp.length(d)))
+        if not (reach <= wp.static(WIDEST) * lattice.step * wp.max(lattice.pixel[0], lattice.pixel[1])):
+            a = wp.vec2(0.0, 0.0)
+            b = a
+            c = a
+            d = a
+        a = at + wp.cw_div(a, lattice.pixel)
+        b = at + wp.cw_div(b, lattice.pixel)
+        c = at + wp.cw_div(c, lattice.pixel)
+        d = at + wp.cw_div(d, lattice.pixel)
+        flux = flux_type()
+        for k in range(wp.static(channels)):
+            flux[k] = share * photon.arrived[k]
+        inside = 0.5 * deposit_triangle(map, lattice.map, base, a, b, c, 0.5 * flux)
+        inside += 0.5 * deposit_triangle(map, lattice.map, base, a, c, d, 0.5 * flux)
+        book_landed(ledger, bin, share * photon.incident, share * photon.transmitted, flux, inside * flux)
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def torn(
+        # In:
+        scene: Scene,
+        suns: wp.array[SunSample],
+        sun: int,
+        lattice: Lattice,
+        first_row: int,
+        torn_cells: wp.array2d[wp.uint8],
+        # Out:
+        map_out: wp.array[dtype],
+        ledger_out: wp.array2d[wp.float64],
+    ):
+        """One thread a cell of the strip; launch dims (rows, columns) of cells."""
+        row, column = wp.tid()
+        if torn_cells[row, column] == wp.uint8(0):
+            return
+        light = suns[sun]
+        index = wp.vec2i(lattice.first[0] + column, first_row + row)
+        low = at_rest(lattice, index, 0.0)
+        high = at_rest(lattice, index, 1.0)
+        low = to_rest(lattice, on_water(lattice, low, light.rest_shift), light.rest_shift)
+        high = to_rest(lattice, on_water(lattice, high, light.rest_shift), light.rest_shift)
+        side = (high - low) / float(wp.static(PARTS))
+        for j in range(wp.static(PARTS)):
+            for i in range(wp.static(PARTS)):
+                corner = wp.vec2(low[0] + side[0] * float(i), low[1] + side[1] * float(j))
+                deposit_part(scene, light, lattice, corner, corner + side, map_out, ledger_out, row * 31 + column)
+
+    return torn

@@ -1,0 +1,20 @@
+"""What every test may ask for."""
+
+from __future__ import annotations
+
+import pytest
+import warp as wp
+
+# Set before Warp initialises: its banner and its compile notes would drown the report of a failing test.
+wp.config.log_level = wp.LOG_WARNING
+
+
+def _devices() -> list[str]:
+    """Devices to test on: the CPU always, the first CUDA device where there is one."""
+    return ["cpu", "cuda:0"] if wp.is_cuda_available() else ["cpu"]
+
+
+@pytest.fixture(params=_devices())
+def device(request: pytest.FixtureRequest) -> str:
+    """Name of a device; a test that takes it runs once on each device present."""
+    return str(request.param)

@@ -1,0 +1,131 @@
+"""Where a ray meets a surface in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from oracle.surfaces import Array, Surface
+
+Flags = npt.NDArray[np.bool_]
+
+MARCH_SHARE = 1e-3  # least step of the march, in shortest waves: what it may step over is 1e-6 of a wave high
+MARCH_LIMIT = 20000  # steps after which a ray is said to miss; the least steps alone span 20 waves
+ROOT_STEPS = 80  # bisection alone reaches float64 in 60
+ROOT_SHARE = 1e-14  # width of a closed bracket, relative to the path
+CROSS_STEPS = 24  # samples in a shortest wave of a crossing test, whose least gap a parabola refines
+
+
+TINY = 1e-300  # keeps a bracket open where a ray starts on the floor
+
+
+def meet_floor(
+    floor: Surface, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array
+) -> tuple[Array, Flags]:
+    """Give the path length to the first meeting with the floor from points on or above it, and whether there is one.
+
+    All arrays are [n]. A plane is solved in closed form. Elsewhere the ray marches by its height over the floor divided
+    by the fastest rate at which that can shrink, so that no meeting is stepped over, then a bracketed Newton closes in.
+    """
+    side = np.hypot(rx, ry)
+    gap = z - floor.height(x, y)
+    if floor.amplitude.size == 0:
+        fall = -(rz - floor.slope[0] * rx - floor.slope[1] * ry)
+        hit = fall > 0.0
+        return np.where(hit, gap / np.where(hit, fall, 1.0), 0.0), hit
+    slowest = -rz - floor.slope_bound * side
+    length, hit = np.zeros(x.shape), np.ones(x.shape, dtype=np.bool_)
+    low, high = np.zeros(x.shape), np.zeros(x.shape)
+    sure = slowest > 0.05 * -rz  # the gap shrinks all the way: one meeting, and a bound on how far
+    high[sure] = 1.001 * np.maximum(gap[sure], 0.0) / slowest[sure] + TINY
+    todo = np.flatnonzero(~sure)
+    if todo.size:
+        low[todo], high[todo], hit[todo] = _march(floor, *(a[todo] for a in (x, y, z, rx, ry, rz)))
+    go = np.flatnonzero(hit)
+    length[go] = _close_in(floor, *(a[go] for a in (x, y, z, rx, ry, rz)), low[go], high[go])
+    return length, hit
+
+
+def _march(
+    floor: Surface, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array
+) -> tuple[Array, Array, Flags]:
+    """Bracket the first change of sign of the height over the floor along each ray."""
+    fastest = -rz + floor.slope_bound * np.hypot(rx, ry)
+    least = MARCH_SHARE * floor.shortest_wave
+    fall = -(rz - floor.slope[0] * rx - floor.slope[1] * ry)
+    above = z - floor.plane(x, y) - floor.swing
+    t = np.where(fall > 0.0, np.maximum(above, 0.0) / np.where(fall > 0.0, fall, 1.0), 0.0)  # over every hill until here
+    low, high, hit = np.zeros(x.shape), np.zeros(x.shape), np.zeros(x.shape, dtype=np.bool_)
+    live = np.arange(x.size)
+    for _ in range(MARCH_LIMIT):
+        gap = z + t * rz - floor.height(x + t * rx, y + t * ry)
+        below = gap < 0.0
+        if below.any():
+            high[live[below]] = t[below]
+            hit[live[below]] = True
+            on = ~below
+            x, y, z, rx, ry, rz, fastest, t, gap = (a[on] for a in (x, y, z, rx, ry, rz, fastest, t, gap))
+            live = live[on]
+            if not live.size:
+                break
+        low[live] = t
+        t = t + np.maximum(gap / fastest, least)
+    return low, high, hit
+
+
+def _close_in(
+    floor: Surface, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array, low: Array, high: Array
+) -> Array:
+    """Newton's method inside a bracket that shrinks; a step that would leave it is a bisection instead."""
+    low, high = low.copy(), high.copy()
+    t = 0.5 * (low + high)
+    live = np.arange(x.size)
+    for _ in range(ROOT_STEPS):
+        at = t[live]
+        h, hx, hy = floor.height_and_slopes(x[live] + at * rx[live], y[live] + at * ry[live])
+        gap = z[live] + at * rz[live] - h
+        above = gap >= 0.0
+        low[live[above]] = at[above]
+        high[live[~above]] = at[~above]
+        rate = rz[live] - hx * rx[live] - hy * ry[live]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            newton = at - gap / rate
+        near = np.abs(newton - at) <= ROOT_SHARE * high[live]
+        inside = near | ((newton > low[live]) & (newton < high[live]))
+        t[live] = np.where(inside, newton, 0.5 * (low[live] + high[live]))
+        done = near | (high[live] - low[live] <= ROOT_SHARE * high[live])
+        live = live[~done]
+        if not live.size:
+            break
+    return t
+
+
+def crosses(
+    water: Surface, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array, end: Array, side: float
+) -> Flags:
+    """Tell whether rays that start on the water cross it again before path length ``end``. All arrays [n].
+
+    ``side`` is 1 for a ray that starts upward into the air, -1 for one that starts downward into the water.
+    """
+    crossed = np.zeros(x.shape, dtype=np.bool_)
+    edge = water.base + side * water.swing
+    with np.errstate(divide="ignore"):
+        clear = np.where(side * rz > 0.0, (edge - z) / rz, np.inf)  # from here on it is past every crest, or trough
+        step = water.shortest_wave / CROSS_STEPS / np.hypot(rx, ry)
+    end = np.minimum(end, clear)
+    live = np.flatnonzero(np.isfinite(step) & (end > 0.0))
+    before, last = np.zeros(live.size), np.zeros(live.size)
+    i = 0
+    while live.size:
+        i += 1
+        t = np.minimum(i * step[live], end[live])
+        gap = side * (z[live] + t * rz[live] - water.height(x[live] + t * rx[live], y[live] + t * ry[live]))
+        crossed[live[gap < 0.0]] = True
+        if i > 1:
+            bend = before - 2.0 * last + gap
+            dip = (before >= last) & (last <= gap) & (bend > 0.0)
+            least = last - (gap - before) ** 2 / (8.0 * np.where(dip, bend, 1.0))
+            crossed[live[dip & (least < 0.0)]] = True
+        on = ~crossed[live] & (t < end[live])
+        before, last, live = last[on], gap[on], live[on]
+    return crossed

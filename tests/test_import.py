@@ -1,0 +1,154 @@
+"""What importing does not do, and which layer may know which."""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import warp_caustics as wc
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "warp_caustics"
+KERNELS = ROOT / "kernels"
+
+# What the device code may import besides its own files: Warp, and what shapes a factory of kernels.
+KERNEL_IMPORTS = {"__future__", "collections", "dataclasses", "enum", "functools", "math", "typing", "warp"}
+# Slow to import, or with effects of their own: used inside functions alone.
+HEAVY = {"OpenEXR", "matplotlib", "PIL", "pyvista", "rasterio", "vtk", "vtkmodules", "xarray"}
+# The outermost layer, which nothing else of the package may know.
+OUTER = {"warp_caustics.__main__", "warp_caustics.cli", "warp_caustics.view"}
+
+# Runs in a fresh process: what is loaded and which settings change, by an import of the package and of all its modules.
+PROBE = """
+import importlib, json, locale, logging, os, pkgutil, random, signal, sys, warnings
+import numpy as np
+import warp as wp
+
+def settings():
+    return {
+        "environment": dict(os.environ),
+        "errstate": np.geterr(),
+        "filters": [str(entry) for entry in warnings.filters],
+        "handlers": [str(handler) for handler in logging.root.handlers],
+        "hooks": [str(sys.excepthook), str(signal.getsignal(signal.SIGINT))],
+        "level": logging.root.level,
+        "locale": locale.setlocale(locale.LC_ALL),
+        "printing": str(np.get_printoptions()),
+        "random": str(random.getstate()),
+        "random of numpy": str(np.random.get_state()),
+        "warp": {name: str(value) for name, value in vars(wp.config).items()},
+    }
+
+before = settings()
+loaded = set(sys.modules)
+import warp_caustics
+first = sorted(set(sys.modules) - loaded)
+names = [module.name for module in pkgutil.walk_packages(warp_caustics.__path__, "warp_caustics.")]
+inner = [name for name in names if not name.startswith(("warp_caustics.cli", "warp_caustics.__main__"))]
+for name in inner:
+    importlib.import_module(name)
+after = settings()
+import warp_caustics.cli  # rich draws random numbers when it is imported
+print(json.dumps({
+    "first": first,
+    "all": sorted(sys.modules),
+    "changed": [name for name in before if before[name] != after[name]],
+    "warp started": wp._src.context.runtime is not None,
+}))
+"""
+
+
+@pytest.fixture(scope="module")
+def probe() -> dict:
+    done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, check=False, cwd=ROOT.parent)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_package_alone_loads_its_errors_alone(probe):
+    ours = {name for name in probe["first"] if name.startswith("warp_caustics")}
+    assert ours == {"warp_caustics", "warp_caustics.errors"}
+
+
+def test_no_module_starts_warp(probe):
+    assert not probe["warp started"]
+
+
+def test_no_module_loads_what_is_heavy(probe):
+    assert "warp_caustics.view" in probe["all"]
+    assert not HEAVY & {name.partition(".")[0] for name in probe["all"]}
+
+
+def test_no_module_changes_a_global_setting(probe):
+    assert probe["changed"] == []
+
+
+def test_the_kernels_are_no_package_of_their_own(probe):
+    assert "warp_caustics.kernels" in probe["all"]
+    assert "kernels" not in probe["all"]
+
+
+def test_every_public_name_is_there_and_once():
+    assert sorted(set(wc.__all__)) == sorted(wc.__all__)
+    for name in wc.__all__:
+        assert getattr(wc, name) is not None
+    assert dir(wc) == sorted(wc.__all__)
+
+
+def test_an_unknown_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="no_such_name"):
+        wc.no_such_name  # noqa: B018
+
+
+@pytest.mark.parametrize("path", sorted(KERNELS.glob("*.py")), ids=lambda path: path.name)
+def test_kernels_know_warp_alone(path):
+    for name in _imports(path, "warp_caustics.kernels"):
+        assert name.startswith("warp_caustics.kernels") or name.partition(".")[0] in KERNEL_IMPORTS, name
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_nothing_inside_knows_the_outer_layer(path):
+    module = ".".join(["warp_caustics", *path.relative_to(PACKAGE).with_suffix("").parts]).removesuffix(".__init__")
+    if _within(module, OUTER):
+        return
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    for name in _imports(path, package):
+        assert not _within(name, OUTER), name
+        assert name.partition(".")[0] not in {"bench", "kernels", "tests"}, name
+
+
+def test_the_guard_reads_relative_imports(tmp_path):
+    path = tmp_path / "probe.py"
+    path.write_text("from .waves import wave\nfrom . import cli\nfrom ..view import view\nimport a.b\n")
+    assert _imports(path, "warp_caustics.kernels") == {
+        "warp_caustics.kernels.waves",
+        "warp_caustics.kernels.waves.wave",
+        "warp_caustics.kernels",
+        "warp_caustics.kernels.cli",
+        "warp_caustics.view",
+        "warp_caustics.view.view",
+        "a.b",
+    }
+
+
+def _within(module: str, packages: set[str]) -> bool:
+    return any(module == package or module.startswith(f"{package}.") for package in packages)
+
+
+def _imports(path: Path, package: str) -> set[str]:
+    """Full names of all that a file imports, wherever in it, given the package that it belongs to."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            base = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            names.add(module)
+            names |= {f"{module}.{alias.name}" for alias in node.names}
+    return names

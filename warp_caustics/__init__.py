@@ -1,0 +1,62 @@
+"""Water caustics by the real-time techniques of the literature, on NVIDIA Warp kernels, CUDA and CPU.
+
+The public names are loaded when they are first used: importing the package does not initialise Warp, import a plotting
+or file library, or change a global setting.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from warp_caustics.errors import InputError, RenderError, WarpCausticsError
+
+if TYPE_CHECKING:
+    from warp_caustics.exr import load_map
+    from warp_caustics.plan import Plan, make_plan
+    from warp_caustics.renderer import Renderer, render
+    from warp_caustics.result import Result
+    from warp_caustics.scene import Scene, bundled_scenes, load_scene
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "InputError",
+    "Plan",
+    "RenderError",
+    "Renderer",
+    "Result",
+    "Scene",
+    "WarpCausticsError",
+    "__version__",
+    "bundled_scenes",
+    "load_map",
+    "load_scene",
+    "make_plan",
+    "render",
+]
+
+# Public name -> the module that defines it.
+_HOMES = {
+    "Plan": "plan",
+    "Renderer": "renderer",
+    "Result": "result",
+    "Scene": "scene",
+    "bundled_scenes": "scene",
+    "load_map": "exr",
+    "load_scene": "scene",
+    "make_plan": "plan",
+    "render": "renderer",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,215 @@
+"""The commands and their options; what they print is in `report`."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+from cyclopts import App, Parameter
+from cyclopts.types import PositiveFloat, PositiveInt
+
+from warp_caustics import __version__
+from warp_caustics.cli import report
+from warp_caustics.cli.quiet import start_warp
+from warp_caustics.errors import InputError
+
+DEFAULT_FPS = 24.0  # frames per second of film
+SUFFIXES = (".exr", ".png")
+
+app = App(
+    name="warp-caustics",
+    help="Water caustics by the real-time techniques of the literature, on NVIDIA Warp kernels, CUDA and CPU.",
+    version=__version__,
+    suppress_keyboard_interrupt=False,
+)
+
+
+def _finite(_: Any, value: float | None) -> None:
+    if value is not None and not math.isfinite(value):
+        raise ValueError("Must be a finite number of seconds.")
+
+
+Time = Annotated[float, Parameter(validator=_finite)]
+Flag = Annotated[bool, Parameter(negative=())]
+Outputs = Annotated[list[Path], Parameter(name=["--output", "-o"], negative=())]
+
+
+@app.command
+def render(
+    scene: str,
+    /,
+    *,
+    method: str | None = None,
+    device: str | None = None,
+    threads: PositiveInt | None = None,
+    time: Time = 0.0,
+    frames: PositiveInt | None = None,
+    fps: PositiveFloat = DEFAULT_FPS,
+    picture: Flag = False,
+    profile: Flag = False,
+    output: Outputs | None = None,
+) -> None:
+    """Render a caustic map, or a numbered sequence of them.
+
+    Parameters
+    ----------
+    scene
+        A bundled scene's name, or a TOML file.
+    method
+        The technique; that of the scene when left out.
+    device
+        `cpu`, `cuda:0`, ...; the best one present when left out.
+    threads
+        Threads on the CPU.
+    time
+        Seconds on the water's clock, of the first frame.
+    frames
+        Frames of a sequence, counted from the time.
+    fps
+        Frames per second of a sequence.
+    picture
+        The scene through its camera. Not yet.
+    profile
+        Time by pass. Not yet.
+    output
+        OUT.exr, OUT.png, or OUT.%04d.exr for a sequence; may be given more than once. SCENE.exr when left out.
+    """
+    _refuse(picture=picture, profile=profile)
+    from warp_caustics.files import check_writable, frame_path, is_sequence
+    from warp_caustics.scene import load_scene
+
+    stem = Path(scene).stem
+    outputs = output or [Path(f"{stem}.exr" if frames is None else f"{stem}.%04d.exr")]
+    _check_outputs(outputs, frames)
+    loaded = load_scene(scene)
+
+    def paths(index: int) -> list[Path]:
+        return [frame_path(path, index) if is_sequence(path) else path for path in outputs]
+
+    for path in paths(0):
+        check_writable(path)
+
+    start_warp()
+    from warp_caustics.renderer import Renderer
+
+    renderer = Renderer(loaded, method=method, device=device, threads=threads)
+    milliseconds = []
+    for index in report.progress(frames or 1):
+        renderer.render(time + index / fps)
+        result = renderer.result()
+        for path in paths(index):
+            result.save(path)
+        milliseconds.append(1e3 * result.seconds)
+    report.print_result(
+        result, files=outputs, frames=frames, milliseconds=milliseconds, compile_seconds=renderer.compile_seconds
+    )
+
+
+@app.command
+def plan(
+    scene: str,
+    /,
+    *,
+    method: str | None = None,
+    device: str | None = None,
+    threads: PositiveInt | None = None,
+) -> None:
+    """Say which passes and buffers a scene needs, which are left out and why, and the bytes.
+
+    Parameters
+    ----------
+    scene
+        A bundled scene's name, or a TOML file.
+    method
+        The technique; that of the scene when left out.
+    device
+        `cpu`, `cuda:0`, ...; the best one present when left out.
+    threads
+        Threads on the CPU.
+    """
+    from warp_caustics.scene import load_scene
+
+    loaded = load_scene(scene)
+    start_warp()
+    from warp_caustics.plan import make_plan
+
+    print(make_plan(loaded, method=method, device=device, threads=threads))
+
+
+@app.command
+def view(
+    scene: str,
+    /,
+    *,
+    method: str | None = None,
+    device: str | None = None,
+    time: Time = 0.0,
+    compare: Flag = False,
+    screenshot: Path | None = None,
+) -> None:
+    """Show the receiver in 3D with the caustic map on it, and the water above it.
+
+    Parameters
+    ----------
+    scene
+        A bundled scene's name, or a TOML file.
+    method
+        The technique; that of the scene when left out.
+    device
+        `cpu`, `cuda:0`, ...; the best one present when left out.
+    time
+        Seconds on the water's clock.
+    compare
+        Several techniques side by side. Not yet.
+    screenshot
+        A PNG to write instead of opening a window; needs no display.
+    """
+    _refuse(compare=compare)
+    from warp_caustics.files import check_writable
+    from warp_caustics.scene import load_scene
+    from warp_caustics.view import check_can_show
+    from warp_caustics.view import view as show
+
+    if screenshot is not None:
+        if screenshot.suffix.lower() != ".png":
+            raise InputError(f"--screenshot: '{screenshot}' should end in .png")
+        check_writable(screenshot)
+    loaded = load_scene(scene)
+    check_can_show(window=screenshot is None)
+    start_warp()
+    from warp_caustics.renderer import render as render_once
+
+    result = render_once(loaded, method=method, device=device, time=time)
+    show(result, screenshot=screenshot)
+    if screenshot is not None:
+        report.print_files([screenshot])
+
+
+@app.command
+def info() -> None:
+    """Say versions, devices, methods, bundled scenes, and whether pictures can be drawn here."""
+    start_warp()
+    report.print_info()
+
+
+def _refuse(**asked: bool) -> None:
+    for name, given in asked.items():
+        if given:
+            raise InputError(f"--{name}: not yet; this version does not have it")
+
+
+def _check_outputs(outputs: list[Path], frames: int | None) -> None:
+    """Refuse names that would not do, before any work."""
+    from warp_caustics.files import is_sequence
+
+    for path in outputs:
+        if path.suffix.lower() not in SUFFIXES:
+            raise InputError(f"--output: '{path}' should end in {' or '.join(SUFFIXES)}")
+        if frames is None and is_sequence(path):
+            raise InputError(f"--output: '{path}' has a frame number, and --frames was not given")
+        if frames is not None and frames > 1 and not is_sequence(path):
+            raise InputError(
+                f"--output: {frames} frames need a frame number in the file's name, such as "
+                f"'{path.stem}.%04d{path.suffix}', and '{path}' has none"
+            )

@@ -1,0 +1,213 @@
+"""What follows from a scene, derived once: the specification of its kernels, the bounds of its light, the reasons.
+
+Each decision to leave something out is taken here, and its reason is kept for the plan to print.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .kernels.spec import Spec
+from .receiver import Bounds, check_covered, receiver_bounds, receiver_kind, rest_depth
+from .scene import IOR_TABLE, JERLOV_TABLE
+from .sun import MOST_DIRECTIONS, disk_count, disk_directions
+from .water import amplitude_bound, extreme_slopes
+from .window import Reach, deviation_bounds, refraction_reach
+
+if TYPE_CHECKING:
+    from .assets import Assets
+    from .scene import Scene
+
+GREEN = 1
+"""The channel whose index of refraction stands for all where there is no dispersion."""
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One thing that a scene could need: whether it does, and why."""
+
+    what: str
+    kept: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class Facts:
+    """All that a plan needs to know of a scene.
+
+    Heights are relative to the water's level, positions to the map's origin, in metres and float64.
+    """
+
+    scene: Scene
+    assets: Assets
+    spec: Spec
+    ior: float
+    attenuation: tuple[float, float, float]
+    irradiance: tuple[float, ...]
+    suns: np.ndarray
+    rest_shifts: np.ndarray
+    rest_depth: float
+    amplitude: float
+    slope: float
+    ground: Bounds
+    pixel: np.ndarray
+    deviation: tuple[np.ndarray, np.ndarray]
+    longest_way: float
+    reasons: tuple[Reason, ...]
+    warnings: tuple[str, ...] = field(default=())
+
+
+def gather_facts(scene: Scene, assets: Assets) -> Facts:
+    """Derive the facts of a scene.
+
+    Raises
+    ------
+    InputError
+        If the map reaches past the terrain.
+    """
+    check_covered(scene, assets)
+    ior, warnings = _ior(scene)
+    pixel = np.asarray(scene.map.size, dtype=np.float64) / np.asarray(scene.map.resolution)
+    slopes = extreme_slopes(scene, assets)
+    amplitude = amplitude_bound(scene, assets)
+    depth = rest_depth(scene, assets)
+    suns = _suns(scene, ior, depth, float(pixel.min()))
+    if len(suns) == MOST_DIRECTIONS:
+        warnings.append(f"sun.angular_diameter: its blur is sampled by {MOST_DIRECTIONS} directions at most")
+    reaches = [refraction_reach(sun, slopes, ior) for sun in suns]
+    steepest = max(reach.steepest for reach in reaches)
+    if any(reach.clipped for reach in reaches):
+        warnings.append("water: the steepest waves bend light past 87 degrees from the vertical; it is not all traced")
+    ground, wide = _ground(scene, assets, amplitude, steepest)
+    depths = (max(0.0, -ground.highest - amplitude), max(0.0, -ground.lowest) + amplitude)
+    reference = 0.5 * (max(0.0, -ground.highest) + max(0.0, -ground.lowest))
+    if receiver_kind(scene) == "waves":
+        reference = depth
+    ends = [deviation_bounds(reach, depths, reference, pixel) for reach in reaches]
+    deviation = (np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0))
+    spec, reasons = _specify(scene, assets, suns, slopes, amplitude, reaches, wide)
+    return Facts(
+        scene=scene,
+        assets=assets,
+        spec=spec,
+        ior=ior,
+        attenuation=_attenuation(scene),
+        irradiance=_colour(scene.sun.irradiance, scene.channels),
+        suns=suns,
+        rest_shifts=np.array([reference * reach.rest for reach in reaches]),
+        rest_depth=depth,
+        amplitude=amplitude,
+        slope=float(np.linalg.norm(slopes, axis=1).max()),
+        ground=wide,
+        pixel=pixel,
+        deviation=deviation,
+        longest_way=depths[1] * np.hypot(1.0, steepest),
+        reasons=reasons,
+        warnings=tuple(warnings),
+    )
+
+
+def _ior(scene: Scene) -> tuple[float, list[str]]:
+    ior = scene.medium.ior
+    if isinstance(ior, str):
+        ior = IOR_TABLE[ior]
+    if isinstance(ior, tuple):
+        return ior[GREEN], [f"medium.ior: given by channel without dispersion, so green's {ior[GREEN]:g} serves for all"]
+    return float(ior), []
+
+
+def _attenuation(scene: Scene) -> tuple[float, float, float]:
+    medium = scene.medium
+    values = _colour(medium.absorption if medium.jerlov is None else JERLOV_TABLE[medium.jerlov], 3)
+    return (values[0], values[1], values[2])
+
+
+def _colour(value: float | tuple[float, ...], channels: int) -> tuple[float, ...]:
+    return tuple(value) if isinstance(value, tuple) else (float(value),) * channels
+
+
+def _suns(scene: Scene, ior: float, depth: float, pixel: float) -> np.ndarray:
+    direction = np.asarray(scene.sun.unit_direction, dtype=np.float64)
+    half = np.radians(scene.sun.angular_diameter) / 2.0
+    zenith = float(np.arccos(np.clip(-direction[2], -1.0, 1.0)))
+    count = disk_count(half, zenith, ior, depth, pixel)
+    suns = disk_directions(direction, half, count)
+    return suns[suns[:, 2] < 0.0]  # the part of a setting sun that is still up
+
+
+def _ground(scene: Scene, assets: Assets, amplitude: float, steepest: float) -> tuple[Bounds, Bounds]:
+    """Bounds of all that light can land on, over the map and over all water that can light it, from the level."""
+    low = np.asarray(scene.map.origin, dtype=np.float64)
+    high = low + np.asarray(scene.map.size)
+    over_map = receiver_bounds(scene, assets, low, high)
+    pad = steepest * (scene.water.level - over_map.lowest + amplitude)
+    wide = receiver_bounds(scene, assets, low - pad, high + pad)
+    bounds = [replace(b, lowest=b.lowest - scene.water.level, highest=b.highest - scene.water.level)
+              for b in (over_map, wide)]  # fmt: skip
+    if assets.objects is not None:
+        z = assets.objects.vertices[:, 2] - scene.water.level
+        bounds = [replace(b, lowest=min(b.lowest, z.min()), highest=max(b.highest, z.max())) for b in bounds]
+    return bounds[0], bounds[1]
+
+
+def _specify(
+    scene: Scene, assets: Assets, suns: np.ndarray, slopes: np.ndarray, amplitude: float, reaches: list[Reach],
+    wide: Bounds,
+) -> tuple[Spec, tuple[Reason, ...]]:  # fmt: skip
+    """Decide what the kernels contain, and say why."""
+    kind = receiver_kind(scene)
+    medium, shadow = scene.medium, scene.water.self_shadow
+    steepest = max(reach.steepest for reach in reaches)
+    faces_away = bool((slopes @ suns[:, :2].T - suns[:, 2] < 0.0).any())
+    self_shadow = faces_away and shadow is not False
+    slope = float(np.linalg.norm(slopes, axis=1).max())
+    exits = slope * steepest > 1.0
+    tears = kind in ("waves", "grid") and wide.slope * steepest >= 1.0
+    over = wide.highest > -amplitude
+    objects = assets.objects is not None
+    shore = kind in ("waves", "grid") and over
+    level = scene.water.level
+    occluders = any(m is not None and m.vertices[:, 2].max() > level - amplitude for m in (assets.mesh, assets.objects))
+    by_depth = medium.jerlov is not None
+    absorbs = by_depth or any(_attenuation(scene))
+    coloured = by_depth or (absorbs and isinstance(medium.absorption, tuple))
+    spec = Spec(
+        water="waves" if assets.water is None else "grid",
+        receiver=kind,
+        objects=objects,
+        bounded=assets.water is not None,
+        shore=shore,
+        occluders=occluders,
+        self_shadow=self_shadow,
+        faces_away=faces_away,
+        exits=exits,
+        tears=tears,
+        fresnel=medium.fresnel,
+        attenuation="none" if not absorbs else "depth" if by_depth else "path",
+        channels=3 if coloured else 1,
+        accumulate=scene.method.accumulate,
+    )
+    up = "the steepest slope stays under the sun's elevation"
+    return spec, (
+        Reason("surface by height map", spec.bounded, "water is a file" if spec.bounded else "water is a sum of waves"),
+        Reason("Fresnel", spec.fresnel, "medium.fresnel" if spec.fresnel else "medium.fresnel is false"),
+        Reason("attenuation", absorbs, f"by {spec.attenuation}" if absorbs else "nothing absorbs: no path length"),
+        Reason("transport by colour", coloured, "absorption differs by channel" if coloured
+               else "all channels travel alike: one is enough"),
+        Reason("self-shadow", self_shadow, "slopes pass the sun's elevation" if self_shadow
+               else "water.self_shadow is false" if faces_away else up),
+        Reason("exit through the surface", exits, "a ray may meet a crest from below" if exits
+               else "no refracted ray is flat enough to meet a crest from below"),
+        Reason("march over terrain", kind in ("waves", "grid"), "receiver.terrain" if kind in ("waves", "grid")
+               else f"the receiver is a {kind}"),
+        Reason("shore", shore, "land may rise above the water" if shore else "no land near the surface"),
+        Reason("torn cells", spec.breaks, "corners of a cell may meet different fates" if spec.breaks
+               else "neighbouring rays stay neighbours"),
+        Reason("BVH", objects or kind == "mesh", "meshes in the scene" if objects or kind == "mesh" else "no meshes"),
+        Reason("sun's disk", len(suns) > 1, f"{len(suns)} directions share the flux" if len(suns) > 1
+               else "one direction: its disk is a point"),
+        Reason("camera", False, "this method does not look" if scene.camera else "no camera"),
+    )  # fmt: skip

@@ -1,0 +1,70 @@
+"""The energy ledger read back: from the kernels' bins to watts."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .energy import Energy
+from .kernels.ledger import ENTRIES
+
+if TYPE_CHECKING:
+    from .facts import Facts
+    from .plan import Plan
+
+
+def read_energy(plan: Plan, ledgers: np.ndarray, caustic_map: np.ndarray, dry: np.ndarray) -> Energy:
+    """Add up a frame's ledger.
+
+    Parameters
+    ----------
+    plan : Plan
+        The renderer's plan.
+    ledgers : ndarray
+        ``[lanes, entries * channels, bins]``, in fluxes of a cell at unit irradiance.
+    caustic_map : ndarray
+        The frame's map.
+    dry : ndarray
+        Irradiance on dry land, summed over pixels, by colour; empty without a shore.
+
+    Returns
+    -------
+    Energy
+        [W].
+    """
+    facts, lattice = plan.facts, plan.program.lattice
+    colours = len(facts.irradiance)
+    pixel_area = float(np.prod(facts.pixel))
+    cell = lattice.step**2 * pixel_area / len(facts.suns) * np.asarray(facts.irradiance)
+    sums = ledgers.sum(axis=(0, 2)).reshape(len(ENTRIES), -1) * np.ones((1, colours)) * cell
+    entries = dict(zip(ENTRIES, sums, strict=True))
+    landed = caustic_map.reshape(-1, colours).sum(axis=0, dtype=np.float64) * pixel_area
+    entries["dry"] = dry[:colours] * pixel_area if len(dry) else np.zeros(colours)
+    entries["received"] = landed - entries["dry"]
+    if plan.method == "gather":
+        inside = entries["emitted"] - sum(entries[name] for name in ENTRIES if name not in ("emitted", "over_lit"))
+        entries["missed_by_window"] = inside - entries["received"]
+    beyond = _beyond_border(facts) * np.asarray(facts.irradiance)
+    entries["emitted"] = entries["emitted"] + beyond
+    entries["missed_by_window"] = entries["missed_by_window"] + beyond
+    return Energy(**{name: _plain(value) for name, value in entries.items()})
+
+
+def _beyond_border(facts: Facts) -> float:
+    """Light at unit irradiance that would light the map, were it at rest, from beyond a height map's border [W]."""
+    grid = facts.assets.water
+    if grid is None:
+        return 0.0
+    low = np.subtract(grid.origin, facts.scene.map.origin)
+    high = low + np.asarray(grid.size)
+    total = 0.0
+    for sun, shift in zip(facts.suns, facts.rest_shifts, strict=True):
+        inside = np.minimum(high + shift, facts.scene.map.size) - np.maximum(low + shift, 0.0)
+        missing = np.prod(facts.scene.map.size) - np.prod(np.maximum(inside, 0.0))
+        total += -sun[2] * max(float(missing), 0.0)
+    return total / len(facts.suns)
+
+
+def _plain(value: np.ndarray) -> float | np.ndarray:
+    return float(value[0]) if len(value) == 1 else value

@@ -1,0 +1,21 @@
+"""One file per method: its passes in order, with their parameters.
+
+A method is a function from the facts of a scene to a :class:`~warp_caustics.program.Program`. Adding one is adding a
+file here and its line in :data:`METHODS`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from .beam import beam
+from .gather import gather
+from .photon import photon
+
+if TYPE_CHECKING:
+    from ..facts import Facts
+    from ..program import Program
+
+METHODS: dict[str, Callable[[Facts], Program]] = {"beam": beam, "photon": photon, "gather": gather}
+"""By name."""

@@ -1,0 +1,77 @@
+"""``gather``: Yuksel & Keyser's two passes over a window of the surface. Plan view, a flat receiver."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels.gather import make_columns, make_intersections, make_rows
+from ..program import Buffer, Pass, Program
+from ..window import Lattice
+
+if TYPE_CHECKING:
+    from ..facts import Facts
+
+BOX_REACH = 1.0
+"""A sample's box reaches into the next pixel."""
+
+
+def gather(facts: Facts) -> Program:
+    """Plan the pre-pass of intersections and the two passes.
+
+    Raises
+    ------
+    InputError
+        If the receiver is not a plane, or the map is to be added up in anything but float32.
+    """
+    scene, spec = facts.scene, facts.spec
+    if spec.receiver != "plane" or spec.objects:
+        on = "objects" if spec.objects else "mesh" if spec.receiver == "mesh" else "terrain"
+        raise InputError(
+            f'method "gather" computes its intersections with a flat receiver, and this scene has receiver.{on}; '
+            'methods that can: "beam", "photon"'
+        )
+    if scene.method.accumulate != "float32":
+        raise InputError(
+            f'method.accumulate = "{scene.method.accumulate}": gather adds up in registers, in a fixed order and in '
+            'float32; leave it out, or use method "beam" or "photon"'
+        )
+    n, m = _window(facts)
+    (columns, rows), half = scene.map.resolution, n // 2
+    lattice = Lattice((-half, -(m // 2)), (columns + 2 * half, rows + m), 1.0)
+    grid = (lattice.count[1], lattice.count[0])
+    flux = f"vec{spec.channels}"
+    return Program(
+        lattice=lattice,
+        strip_rows=lattice.count[1],
+        passes=(
+            Pass("intersections", "waves, refraction, landing of each sample", lambda: make_intersections(spec),
+                 lambda _: grid),
+            Pass("rows", f"gather pass 1: {n} samples in a row, for {m + 1} pixels of a column",
+                 lambda: make_rows(spec.channels), lambda _: (rows + m, columns)),
+            Pass("columns", f"gather pass 2: {m + 1} channels of a column", lambda: make_columns(spec.channels),
+                 lambda _: (rows, columns)),
+        ),
+        buffers=(
+            Buffer("landing", "vec2", grid, 8),
+            Buffer("flux", flux, grid, 4 * spec.channels),
+            Buffer("channel", flux, (m + 1, rows + m, columns), 4 * spec.channels),
+        ),
+        values={"n": n, "m": m},
+        settings={"n": n, "m": m},
+        banded=False,
+    )  # fmt: skip
+
+
+def _window(facts: Facts) -> tuple[int, int]:
+    """N and M: those of the scene, or wide enough for the largest deflection from the illumination centre."""
+    settings = facts.scene.method.gather
+    widest = np.ceil(np.maximum(-facts.deviation[0], facts.deviation[1]) + BOX_REACH)
+    n = settings.n if settings.n is not None else 2 * int(widest[0]) + 1
+    if settings.m is not None:
+        m = settings.m
+    else:
+        m = settings.n - 1 if settings.n is not None else 2 * int(widest[1])
+    return n, max(m, 2)

@@ -1,0 +1,46 @@
+"""``photon``: one photon a cell of the surface, splatted where it lands. Plan view, any receiver."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.scatter import make_scatter
+from ..program import Pass, Program
+from ..window import lattice_over
+
+if TYPE_CHECKING:
+    from ..facts import Facts
+
+STRIP_ROWS = 256
+"""Rows of a strip: enough strips for every core, few enough launches."""
+
+
+def photon(facts: Facts) -> Program:
+    """Plan the one pass that follows photons from the surface into the map."""
+    settings = facts.scene.method.photon
+    spec = replace(facts.spec, backlund=settings.projection == "backlund")
+    low, high = facts.deviation
+    step = float(np.sqrt(1.0 / settings.photons_per_pixel))
+    widths = {"point": 0.0, "pixel": 1.0, "cell": step}
+    width = widths[settings.footprint] if isinstance(settings.footprint, str) else float(settings.footprint)
+    # A box reaches half its width beyond the cell that the bounds speak of.
+    spare = max(0.0, 0.5 * (width - step))
+    lattice = lattice_over(low - spare, high + spare, facts.scene.map.resolution, step)
+    columns, rows = lattice.count[0], min(STRIP_ROWS, lattice.count[1])
+    scatter = Pass(
+        "scatter", "waves, refraction, landing, splat of each photon", lambda: make_scatter(spec),
+        lambda strip: (strip, columns),
+    )  # fmt: skip
+    return Program(
+        lattice=lattice,
+        strip_rows=rows,
+        passes=(scatter,),
+        buffers=(),
+        values={"footprint": (width, width)},
+        accumulate=spec.accumulate,
+        settings={"photons_per_pixel": settings.photons_per_pixel, "footprint": settings.footprint,
+                  "projection": settings.projection},
+    )  # fmt: skip

@@ -1,0 +1,204 @@
+"""The plan: what a scene and a method need, what they leave out and why, and how many bytes it takes."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from .assets import load_assets
+from .errors import InputError
+from .facts import Facts, gather_facts
+from .kernels.deposit import ACCUMULATOR
+from .kernels.ledger import BINS, ENTRIES
+from .methods import METHODS
+from .program import Buffer, Program
+from .scene import Scene, known_method, load_scene
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+WAVE_BYTES, SUN_BYTES = 16, 20
+"""Bytes of a wave and of a direction of the sun on the device."""
+
+SPARE_MEMORY = 0.9
+"""Share of the free memory that a plan may take."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What will be done for a frame, for people and for the renderer.
+
+    Attributes
+    ----------
+    method, device : str
+        By name.
+    threads : int
+        Lanes that strips are spread over; 1 on a GPU.
+    facts : Facts
+        What follows from the scene.
+    program : Program
+        What the method does.
+    buffers : tuple of Buffer
+        Everything that is allocated.
+    """
+
+    method: str
+    device: str
+    threads: int
+    facts: Facts
+    program: Program
+    buffers: tuple[Buffer, ...]
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of all buffers."""
+        return sum(self.copies(buffer) * buffer.bytes for buffer in self.buffers)
+
+    @property
+    def launches(self) -> int:
+        """Kernel launches in a frame."""
+        jobs = self.program.strips * len(self.facts.suns)
+        return jobs * len(self.program.passes) + 1 + int(self.facts.spec.shore)
+
+    @property
+    def kernels(self) -> tuple[str, ...]:
+        """Names of the kernels that are compiled."""
+        dry = ("dry_land",) if self.facts.spec.shore else ()
+        return (*(step.name for step in self.program.passes), "resolve", *dry)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know before trusting the map."""
+        return self.facts.warnings
+
+    def copies(self, buffer: Buffer) -> int:
+        """Count how often a buffer is allocated."""
+        return self.threads if buffer.per_lane else 1
+
+    def __str__(self) -> str:
+        """Return the plan as text: kept, left out, why, bytes."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        scene, program, lattice = self.facts.scene, self.program, self.program.lattice
+        settings = ", ".join(f"{name} = {value}" for name, value in program.settings.items())
+        yield f"{scene.name}: method {self.method} ({settings}) on {self.device}, {self.threads} thread(s)"
+        yield (
+            f"  map {scene.map.resolution[0]} x {scene.map.resolution[1]} pixels, "
+            f"water {lattice.count[0]} x {lattice.count[1]} cells, {len(self.facts.suns)} sun direction(s)"
+        )
+        yield "passes"
+        jobs = program.strips * len(self.facts.suns)
+        for step in program.passes:
+            yield f"  {step.name:<16}{jobs:>6} launch(es)  {step.does}"
+        yield f"  {'resolve':<16}{1:>6} launch(es)  lanes added up and scaled to irradiance"
+        if self.facts.spec.shore:
+            yield f"  {'dry_land':<16}{1:>6} launch(es)  direct sunlight on dry land"
+        for kept in (True, False):
+            yield "kept" if kept else "left out"
+            for reason in self.facts.reasons:
+                if reason.kept == kept:
+                    yield f"  {reason.what:<28}{reason.why}"
+        yield "buffers"
+        for buffer in self.buffers:
+            copies = self.copies(buffer)
+            times = f" x {copies} threads" if copies > 1 else ""
+            shape = " x ".join(str(length) for length in buffer.shape)
+            yield f"  {buffer.name:<16}{copies * buffer.bytes:>14,} bytes  {buffer.dtype} {shape}{times}"
+        yield f"{self.launches} launches, {len(self.kernels)} kernels, {self.bytes:,} bytes"
+        for warning in self.warnings:
+            yield f"warning: {warning}"
+
+
+def make_plan(
+    scene: Scene | str | os.PathLike[str], method: str | None = None, device: str | None = None, threads: int | None = None
+) -> Plan:
+    """Plan a scene: which passes and buffers it needs, and why the others are left out.
+
+    Nothing is compiled and nothing is allocated on a device.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        A scene, the name of a bundled one, or a file.
+    method : str, optional
+        Instead of the scene's own.
+    device : str, optional
+        ``"cpu"``, ``"cuda:0"``; the best one present if not given.
+    threads : int, optional
+        Threads on a CPU; all cores if not given.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        If the scene, method, device or number of threads cannot be used together, or would not fit in memory.
+    """
+    from .device import free_memory, resolve_device, resolve_threads
+
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
+    name = known_method(method if method is not None else scene.method.name)
+    device = resolve_device(device)
+    check_map_fits(scene, device, free_memory(device))
+    facts = gather_facts(scene, load_assets(scene))
+    program = METHODS[name](facts)
+    lanes = min(resolve_threads(threads, device), program.strips * len(facts.suns)) if program.banded else 1
+    plan = Plan(name, device, lanes, facts, program, _buffers(facts, program))
+    free = free_memory(device)
+    if plan.bytes > SPARE_MEMORY * free:
+        raise InputError(
+            f"map: {scene.map.resolution[0]} x {scene.map.resolution[1]} pixels by method {name} take {plan.bytes:,} "
+            f"bytes, and {device} has {free:,} free; lower map.resolution" + (" or threads" if lanes > 1 else "")
+        )
+    return plan
+
+
+def check_map_fits(scene: Scene, device: str, free: int) -> None:
+    """Refuse a map whose pixels alone do not fit in memory, before anything is loaded or derived.
+
+    Raises
+    ------
+    InputError
+        With the bytes that it takes and those that are free.
+    """
+    columns, rows = scene.map.resolution
+    least = columns * rows * 4 * (1 + scene.channels)
+    if least > SPARE_MEMORY * free:
+        raise InputError(
+            f"map.resolution: {columns} x {rows} pixels take at least {least:,} bytes, and {device} has {free:,} free; "
+            "expected a map that fits in memory"
+        )
+
+
+def _buffers(facts: Facts, program: Program) -> tuple[Buffer, ...]:
+    import warp as wp
+
+    columns, rows = facts.scene.map.resolution
+    colours = len(facts.irradiance)
+    element = wp.types.type_size_in_bytes(ACCUMULATOR[program.accumulate])
+    values = columns * rows * facts.spec.channels
+    ledger = (len(ENTRIES) * facts.spec.channels, BINS)
+    buffers = [
+        Buffer("caustic_map", "float32", (columns * rows * colours,), 4),
+        Buffer("map", program.accumulate, (values,), element, per_lane=True),
+        Buffer("ledger", "float64", ledger, 8, per_lane=True),
+        *program.buffers,
+        Buffer("suns", "SunSample", (len(facts.suns),), SUN_BYTES),
+    ]
+    if facts.scene.water.waves:
+        buffers.append(Buffer("waves", "Wave", (len(facts.scene.water.waves),), WAVE_BYTES))
+    for name, grid in (("water_nodes", facts.assets.water), ("terrain_nodes", facts.assets.terrain)):
+        if grid is not None:
+            buffers.append(Buffer(name, "vec4", grid.z.shape, 16))
+    for name, mesh in (("mesh", facts.assets.mesh), ("objects", facts.assets.objects)):
+        if mesh is not None:
+            # Vertices and indices; the BVH is Warp's own and comes on top.
+            buffers.append(Buffer(name, "Mesh", (mesh.vertices.size + mesh.triangles.size,), 4))
+    if facts.spec.shore:
+        buffers.append(Buffer("dry", "float64", (3,), 8))
+    return tuple(buffers)

@@ -1,0 +1,95 @@
+"""The words in which a method says its plan: passes and buffers, by name.
+
+A pass names a kernel and the shape of its launch. What it is launched with follows from the kernel's own signature:
+each parameter stands for the value or buffer of its name, ``map_out`` for the buffer ``map``. Buffers that no pass of
+a program has are not allocated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .window import Lattice
+
+
+@dataclass(frozen=True)
+class Buffer:
+    """An array of a program: its element by Warp's name, and its shape; a ``per_lane`` one exists once a thread."""
+
+    name: str
+    dtype: str
+    shape: tuple[int, ...]
+    element_bytes: int
+    per_lane: bool = False
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of one copy."""
+        total = self.element_bytes
+        for length in self.shape:
+            total *= length
+        return total
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One launch, for each strip of the lattice and direction of the sun.
+
+    Attributes
+    ----------
+    name : str
+        What the pass is called.
+    does : str
+        What it does, in a line.
+    kernel : callable
+        Builds the kernel; called when a renderer compiles, not when a plan is made.
+    dim : callable
+        Rows of the strip to launch dimensions.
+    """
+
+    name: str
+    does: str
+    kernel: Callable[[], Any]
+    dim: Callable[[int], tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class Program:
+    """What a method does for a frame, before the map is resolved.
+
+    Attributes
+    ----------
+    lattice : Lattice
+        The water's cells.
+    strip_rows : int
+        Rows of the lattice that are worked on at a time.
+    passes : tuple of Pass
+        In order, for each strip.
+    buffers : tuple of Buffer
+        What the passes need besides the map and the ledger.
+    values : mapping
+        Plain parameters of the kernels, by name.
+    accumulate : str
+        Number format of the map while light is added up.
+    settings : mapping
+        The method's parameters as chosen, for people to read.
+    banded : bool
+        Whether strips may run side by side, each thread adding to a map of its own.
+    """
+
+    lattice: Lattice
+    strip_rows: int
+    passes: tuple[Pass, ...]
+    buffers: tuple[Buffer, ...]
+    values: Mapping[str, Any] = field(default_factory=dict)
+    accumulate: str = "float32"
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    banded: bool = True
+
+    @property
+    def strips(self) -> int:
+        """Strips that cover the lattice."""
+        return -(-self.lattice.count[1] // self.strip_rows)

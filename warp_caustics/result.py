@@ -1,0 +1,111 @@
+"""A rendered frame, read back: its map, its energy, what to know of it, and its way to a file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .errors import InputError
+from .receiver import receiver_kind, receiver_slopes
+
+if TYPE_CHECKING:
+    import os
+
+    from .assets import Assets
+    from .energy import Energy
+    from .plan import Plan
+    from .scene import Scene
+
+OVER_LIT_LIMIT = 0.01
+"""Share of the light that may enter twice before it is worth a warning."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """One frame.
+
+    Attributes
+    ----------
+    scene : Scene
+        What was rendered.
+    method, device : str
+        By what, and where.
+    time : float
+        [s].
+    plan : Plan
+        What was done for it.
+    caustic_map : ndarray
+        Flux per horizontal area, float32 ``[rows, columns]`` or ``[rows, columns, 3]``, in the units of the sun's
+        irradiance; row 0 at the map's origin. Its sum times the pixel's area is the flux.
+    energy : Energy
+        Where the light went [W].
+    seconds : float
+        Time of the frame, compilation apart.
+    screen_map, picture : None
+        What an eye sees: the methods of this version do not look.
+    """
+
+    scene: Scene
+    method: str
+    device: str
+    time: float
+    plan: Plan
+    caustic_map: np.ndarray
+    energy: Energy
+    seconds: float
+    assets: Assets = field(repr=False)
+    screen_map: np.ndarray | None = None
+    picture: np.ndarray | None = None
+
+    @cached_property
+    def surface_irradiance(self) -> np.ndarray | None:
+        """The map per area of the receiver itself, ``caustic_map / sqrt(1 + |grad z|^2)``; None for meshes."""
+        if receiver_kind(self.scene) == "mesh" or self.assets.objects is not None:
+            return None
+        slopes = receiver_slopes(self.scene, self.assets)
+        scale = 1.0 / np.sqrt(1.0 + (slopes**2).sum(axis=-1))
+        if self.caustic_map.ndim == 3:
+            scale = scale[..., None]
+        return (self.caustic_map * scale).astype(np.float32)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What to know before trusting the map."""
+        notes = list(self.plan.warnings)
+        emitted, over_lit = np.max(self.energy.emitted), np.max(self.energy.over_lit)
+        if over_lit > OVER_LIT_LIMIT * emitted:
+            notes.append(
+                f"water.self_shadow is false, and {over_lit / emitted:.1%} of the light enters twice, "
+                "through crests and again behind them"
+            )
+        return notes
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the map as EXR, or as a PNG picture, by the file's ending; whole, or not at all.
+
+        Raises
+        ------
+        InputError
+            If the ending is another one, or the folder cannot be written.
+        """
+        from . import __version__
+        from .exr import write_map
+        from .png import write_png
+
+        path = Path(path)
+        scene = self.scene
+        units = "in units of sun.irradiance"
+        if path.suffix.lower() == ".exr":
+            write_map(
+                path, self.caustic_map, scene_text=scene.to_toml(), version=__version__, method=self.method,
+                units=units, origin=scene.map.origin, size=scene.map.size, energy=self.energy, time=self.time,
+            )  # fmt: skip
+        elif path.suffix.lower() == ".png":
+            write_png(path, self.caustic_map, origin=scene.map.origin, size=scene.map.size, units=units)
+        else:
+            raise InputError(f"{path}: expected a file that ends in .exr or .png")
+        return path

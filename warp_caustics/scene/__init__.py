@@ -1,0 +1,47 @@
+"""The scene file: its models, their validation, and loading."""
+
+from warp_caustics.scene.frame import Camera, Map
+from warp_caustics.scene.light import Medium, Sun
+from warp_caustics.scene.load import bundled_scenes, load_scene, parse_scene
+from warp_caustics.scene.medium_tables import CHANNEL_WAVELENGTHS, IOR_TABLE, JERLOV_TABLE
+from warp_caustics.scene.method import (
+    METHODS,
+    PLANNED_METHODS,
+    BeamSettings,
+    GatherSettings,
+    Method,
+    PhotonSettings,
+    known_method,
+)
+from warp_caustics.scene.receiver import ClosedTerrain, MeshObject, Receiver, TerrainFile, TerrainWave
+from warp_caustics.scene.scene import Scene
+from warp_caustics.scene.water import HeightMap, Water, Wave
+
+__all__ = [
+    "CHANNEL_WAVELENGTHS",
+    "IOR_TABLE",
+    "JERLOV_TABLE",
+    "METHODS",
+    "PLANNED_METHODS",
+    "BeamSettings",
+    "Camera",
+    "ClosedTerrain",
+    "GatherSettings",
+    "HeightMap",
+    "Map",
+    "Medium",
+    "MeshObject",
+    "Method",
+    "PhotonSettings",
+    "Receiver",
+    "Scene",
+    "Sun",
+    "TerrainFile",
+    "TerrainWave",
+    "Water",
+    "Wave",
+    "bundled_scenes",
+    "known_method",
+    "load_scene",
+    "parse_scene",
+]

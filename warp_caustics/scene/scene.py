@@ -1,0 +1,58 @@
+"""`Scene`: the whole of a scene file."""
+
+from __future__ import annotations
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from warp_caustics.scene.faults import refusal
+from warp_caustics.scene.frame import Camera, Map
+from warp_caustics.scene.light import Medium, Sun
+from warp_caustics.scene.method import Method
+from warp_caustics.scene.model import Model
+from warp_caustics.scene.receiver import Receiver
+from warp_caustics.scene.text import toml_text
+from warp_caustics.scene.values import Text
+from warp_caustics.scene.water import Water
+
+
+class Scene(Model):
+    """Water, what lies under it, light, and the map that is asked for.
+
+    A scene is frozen; `scene.model_copy(update={...})` makes another one. Calling `Scene` with its tables, as models or
+    as dictionaries, checks them as a file is checked.
+
+    Raises
+    ------
+    InputError
+        With every fault, one a line, each with its path in the file.
+    """
+
+    name: Text = Field(default="scene", description="what the scene is called; the file's own name when not given")
+    water: Water = Field(description="the surface that refracts")
+    receiver: Receiver = Field(description="what lies under the water")
+    sun: Sun = Field(description="the light")
+    medium: Medium = Field(description="what the water does to it")
+    map: Map = Field(description="the caustic map in plan view")
+    camera: Camera | None = Field(default=None, description="only for pictures and screen-space methods")
+    method: Method = Field(default=Method(), description="how the map is made")
+
+    @field_validator("receiver")
+    @classmethod
+    def _floor_under_water(cls, receiver: Receiver, info: ValidationInfo) -> Receiver:
+        water: Water | None = info.data.get("water")  # None when it has faults of its own
+        if water is not None and receiver.plane is not None and receiver.plane >= water.level:
+            raise refusal(f"expected a plane below the water's level {water.level}, got {receiver.plane}")
+        return receiver
+
+    @property
+    def channels(self) -> int:
+        """Three when light or its loss has colour, else one; an ior by channel alone makes none without dispersion."""
+        coloured = isinstance(self.sun.irradiance, tuple) or isinstance(self.medium.absorption, tuple)
+        return 3 if coloured or self.medium.jerlov is not None else 1
+
+    def to_toml(self) -> str:
+        """Return the scene as the text of a scene file, with the keys that were given.
+
+        `parse_scene` makes an equal scene of it. Files stand in it as they were resolved.
+        """
+        return toml_text(self.model_dump(exclude_unset=True, exclude_none=True))

@@ -1,0 +1,1 @@
+"""Bundled scenes, as data files."""

@@ -1,0 +1,154 @@
+"""The device's view of a scene: structs and arrays that the kernels read, and what the host writes before a frame."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from .height_map import hermite_nodes, node_spacing
+from .kernels.grid import Grid
+from .kernels.lattice import Lattice
+from .kernels.photon import Scene, SunSample
+from .kernels.surface import Surface
+from .kernels.waves import Wave
+from .water import phases
+
+if TYPE_CHECKING:
+    from .assets import HeightGrid, TriangleMesh
+    from .facts import Facts
+    from .window import Lattice as HostLattice
+
+PIXELS_A_STEP = 0.25
+"""Smallest step of a march, in pixels: an edge is then found to a fraction of what the map shows."""
+
+STEPS_A_WAY = 2048
+"""Smallest step of a march, as a share of the longest way: half of the steps after which a march gives up."""
+
+ENDLESS = 1.0e30
+"""Where water without a border ends."""
+
+
+class SceneState:
+    """Structs and arrays on a device; owns what they point to.
+
+    Attributes
+    ----------
+    scene : Scene
+        What a photon meets.
+    suns : wp.array
+        Directions of the sun, written by :meth:`write`.
+    """
+
+    def __init__(self, facts: Facts, device: str) -> None:
+        self._facts, self._device = facts, device
+        self._keep: list[Any] = []
+        # The host side is pinned, so that a copy can be part of a captured frame.
+        pinned = device != "cpu"
+        count = len(facts.scene.water.waves or ())
+        self._host_waves = wp.zeros(count, dtype=Wave, device="cpu", pinned=pinned)
+        self._host_suns = wp.zeros(len(facts.suns), dtype=SunSample, device="cpu", pinned=pinned)
+        self._waves = wp.empty(count, dtype=Wave, device=device)
+        self.suns = wp.empty(len(facts.suns), dtype=SunSample, device=device)
+        self.scene = self._make_scene()
+        self._write_constants()
+
+    def write(self, time: float) -> None:
+        """Put the waves' phases at a time, and the sun, on the device; allocates nothing."""
+        if len(self._host_waves):
+            self._host_waves.numpy()["phase"] = phases(self._facts.scene, time, self._facts.rest_depth)
+            wp.copy(self._waves, self._host_waves)
+        wp.copy(self.suns, self._host_suns)
+
+    def lattice(self, lattice: HostLattice) -> Lattice:
+        """Make the kernels' form of a lattice."""
+        facts, made = self._facts, Lattice()
+        made.step = lattice.step
+        made.first = wp.vec2i(*lattice.first)
+        made.count = wp.vec2i(*lattice.count)
+        made.pixel = wp.vec2(*facts.pixel)
+        made.map = wp.vec2i(*facts.scene.map.resolution)
+        low, high = np.full(2, -ENDLESS), np.full(2, ENDLESS)
+        if facts.assets.water is not None:
+            low = np.subtract(facts.assets.water.origin, facts.scene.map.origin)
+            high = low + np.asarray(facts.assets.water.size)
+        made.low, made.high = wp.vec2(*low), wp.vec2(*high)
+        return made
+
+    def _write_constants(self) -> None:
+        suns, waves = self._host_suns.numpy(), self._host_waves.numpy()
+        suns["direction"] = self._facts.suns
+        suns["rest_shift"] = self._facts.rest_shifts
+        for i, wave in enumerate(self._facts.scene.water.waves or ()):
+            waves["amplitude"][i] = wave.amplitude
+            waves["wavevector"][i] = wave.wavevector
+
+    def _make_scene(self) -> Scene:
+        facts, scene = self._facts, Scene()
+        step = max(PIXELS_A_STEP * float(facts.pixel.min()), facts.longest_way / STEPS_A_WAY)
+        scene.water.surface = self._surface(facts.assets.water, self._waves)
+        scene.water.amplitude = facts.amplitude
+        scene.water.slope = facts.slope
+        scene.water.step = step
+        scene.medium.ior = facts.ior
+        scene.medium.eta = 1.0 / facts.ior
+        scene.medium.attenuation = wp.vec3(*facts.attenuation)
+        receiver, ground = scene.receiver, facts.ground
+        receiver.lowest, receiver.highest = ground.lowest, ground.highest
+        receiver.slope = ground.slope if np.isfinite(ground.slope) else 0.0
+        receiver.step = step
+        receiver.reach = 4.0 * (facts.longest_way + ground.highest - ground.lowest)
+        if facts.spec.receiver == "plane":
+            receiver.level = ground.lowest if not facts.spec.objects else self._plane_level()
+        receiver.terrain = self._terrain()
+        receiver.mesh = self._mesh(facts.assets.mesh)
+        receiver.objects = self._mesh(facts.assets.objects)
+        return scene
+
+    def _plane_level(self) -> float:
+        return float(self._facts.scene.receiver.plane or 0.0) - self._facts.scene.water.level
+
+    def _terrain(self) -> Surface:
+        facts = self._facts
+        origin, level = np.asarray(facts.scene.map.origin, dtype=np.float64), facts.scene.water.level
+        if facts.spec.receiver != "waves":
+            return self._surface(facts.assets.terrain, None, level)
+        terrain = facts.scene.receiver.terrain
+        table = np.zeros(len(terrain.waves), dtype=Wave.numpy_dtype())
+        for i, wave in enumerate(terrain.waves):
+            turn = np.mod(wave.phase + np.dot(wave.wavevector, origin), 2.0 * np.pi)
+            table[i] = (wave.amplitude, wave.wavevector, turn)
+        waves = wp.array(table, dtype=Wave, device=self._device)
+        self._keep.append(waves)
+        surface = self._surface(None, waves)
+        surface.base = float(terrain.base + np.dot(terrain.slope, origin) - level)
+        surface.slope = wp.vec2(*terrain.slope)
+        return surface
+
+    def _surface(self, grid: HeightGrid | None, waves: Any, level: float = 0.0) -> Surface:
+        surface = Surface()
+        if waves is not None:
+            surface.waves = waves
+        if grid is not None:
+            nodes = hermite_nodes(grid.z)
+            nodes[..., 0] -= level
+            made, spacing = Grid(), node_spacing(grid)
+            made.nodes = wp.array(nodes.astype(np.float32), dtype=wp.vec4, device=self._device)
+            made.origin = wp.vec2(*(np.subtract(grid.origin, self._facts.scene.map.origin) + 0.5 * spacing))
+            made.per_metre = wp.vec2(*(1.0 / spacing))
+            self._keep.append(made.nodes)
+            surface.grid = made
+        return surface
+
+    def _mesh(self, mesh: TriangleMesh | None) -> Any:
+        if mesh is None:
+            return wp.uint64(0)
+        scene = self._facts.scene
+        vertices = mesh.vertices - np.array([*scene.map.origin, scene.water.level])
+        made = wp.Mesh(
+            points=wp.array(vertices.astype(np.float32), dtype=wp.vec3, device=self._device),
+            indices=wp.array(mesh.triangles.astype(np.int32).ravel(), dtype=wp.int32, device=self._device),
+        )
+        self._keep.append(made)
+        return made.id

@@ -1,0 +1,116 @@
+"""The water on the host: its waves at a time, its bounds, its height for drawing. All in float64."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .height_map import OVERSHOOT, node_slopes, sample_heights
+
+if TYPE_CHECKING:
+    from .assets import Assets
+    from .scene import Scene
+
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s^2]."""
+
+ZONOTOPE_DIRECTIONS = 64
+"""Directions in which the set of slopes is taken at its farthest; it bulges between them by 1 / cos(pi / 64)."""
+
+RADII = np.linspace(0.0, 1.0, 9)
+"""Where, from no slope to the farthest, refraction is tried for its bounds."""
+
+
+def angular_frequency(wavenumber: np.ndarray, depth: float) -> np.ndarray:
+    """Angular frequency of gravity waves over a finite depth: w^2 = g k tanh(k d) (Airy).
+
+    Parameters
+    ----------
+    wavenumber : ndarray
+        [rad/m].
+    depth : float
+        Of the water at rest [m].
+
+    Returns
+    -------
+    ndarray
+        [rad/s].
+    """
+    return np.sqrt(GRAVITY * wavenumber * np.tanh(wavenumber * depth))
+
+
+def phases(scene: Scene, time: float, depth: float) -> np.ndarray:
+    """Phase of each wave at the map's origin at a time, reduced to [0, 2 pi) [rad].
+
+    Taken in float64, so that neither a distant map nor a late time costs the kernels a digit.
+    """
+    waves = scene.water.waves or ()
+    k = np.array([wave.wavevector for wave in waves], dtype=np.float64).reshape(-1, 2)
+    given = [wave.angular_frequency for wave in waves]
+    own = angular_frequency(np.hypot(k[:, 0], k[:, 1]), depth)
+    omega = np.array([own[i] if w is None else w for i, w in enumerate(given)])
+    phase = np.array([wave.phase for wave in waves]) + k @ np.asarray(scene.map.origin, dtype=np.float64)
+    # The two large terms are reduced apart, so that their sum does not round them together.
+    return np.mod(np.mod(phase, 2.0 * np.pi) - np.mod(omega * time, 2.0 * np.pi), 2.0 * np.pi)
+
+
+def extreme_slopes(scene: Scene, assets: Assets) -> np.ndarray:
+    """Points ``[n, 2]`` whose convex hull holds every slope that the surface can have, zero among them.
+
+    For waves the slopes fill a zonotope, the sum of the segments from -a k to a k; for a height map those of its
+    nodes, with :data:`~.height_map.OVERSHOOT`, as a disk.
+    """
+    angle = np.linspace(0.0, 2.0 * np.pi, ZONOTOPE_DIRECTIONS, endpoint=False)
+    outward = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    if assets.water is not None:
+        steepest = OVERSHOOT * np.linalg.norm(node_slopes(assets.water), axis=1).max()
+        rim = outward * steepest / np.cos(np.pi / ZONOTOPE_DIRECTIONS)
+    else:
+        steps = np.array([np.multiply(wave.amplitude, wave.wavevector) for wave in scene.water.waves or ()])
+        steps = steps.reshape(-1, 2)
+        rim = np.sign(outward @ steps.T) @ steps
+    return (RADII[:, None, None] * rim).reshape(-1, 2)
+
+
+def amplitude_bound(scene: Scene, assets: Assets) -> float:
+    """Largest displacement from the rest level, either way [m]."""
+    if assets.water is not None:
+        return float(OVERSHOOT * np.abs(assets.water.z).max())
+    return float(sum(abs(wave.amplitude) for wave in scene.water.waves or ()))
+
+
+def water_heights(
+    scene: Scene, assets: Assets, x: np.ndarray, y: np.ndarray, time: float, depth: float | None = None
+) -> np.ndarray:
+    """Height of the water's surface at world coordinates, for drawing.
+
+    Parameters
+    ----------
+    scene, assets
+        The scene and the files that it names.
+    x, y : ndarray
+        World coordinates of any one shape [m].
+    time : float
+        [s].
+    depth : float, optional
+        Depth for the waves' dispersion relation [m]; taken from the receiver if not given.
+
+    Returns
+    -------
+    ndarray
+        z [m], float64.
+    """
+    x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
+    if assets.water is not None:
+        return scene.water.level + sample_heights(assets.water, x, y)
+    if depth is None:
+        from .receiver import rest_depth
+
+        depth = rest_depth(scene, assets)
+    z = np.full(x.shape, float(scene.water.level))
+    origin = scene.map.origin
+    for wave, phase in zip(scene.water.waves or (), phases(scene, time, depth), strict=True):
+        kx, ky = wave.wavevector
+        z += wave.amplitude * np.sin(kx * (x - origin[0]) + ky * (y - origin[1]) + phase)
+    return z

@@ -1,0 +1,102 @@
+"""Which water can light the map: bounds of refraction, and the lattice that covers that water and no more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import InputError
+from .sun import refract_slopes
+
+STEEPEST_RAY = 20.0
+"""Tangent of the flattest refracted ray that the window is made for (87 degrees from the vertical)."""
+
+MOST_CELLS = 2**36
+"""Cells of a lattice at most: beyond it a frame takes hours, and indices leave what float32 counts by rows."""
+
+INDEX_BOUND = 2**24
+"""Rows or columns at most: float32 counts whole numbers up to here."""
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far light travels sideways under water, for one direction of the sun.
+
+    Attributes
+    ----------
+    rest : ndarray
+        Horizontal way by unit depth, from a surface at rest, ``[2]``.
+    low, high : ndarray
+        Its bounds over all slopes of the surface, ``[2]`` each.
+    steepest : float
+        The largest tangent of a refracted ray's angle from the vertical.
+    clipped : bool
+        True where a ray flatter than :data:`STEEPEST_RAY` was cut to it.
+    """
+
+    rest: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    steepest: float
+    clipped: bool
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Cells of water: index of the first (column, row), their count, and their step [pixels]."""
+
+    first: tuple[int, int]
+    count: tuple[int, int]
+    step: float
+
+    @property
+    def cells(self) -> int:
+        """Cells in all."""
+        return self.count[0] * self.count[1]
+
+
+def refraction_reach(direction: np.ndarray, slopes: np.ndarray, ior: float) -> Reach:
+    """Bounds of the refracted rays from a surface whose slopes ``[n, 2]`` are given, where it faces the sun."""
+    rest = refract_slopes(direction, np.zeros((1, 2)), ior)[0]
+    rays = refract_slopes(direction, slopes, ior)
+    lit = slopes @ direction[:2] - direction[2] > 0.0
+    rays = np.concatenate([rest[None, :], rays[lit]])
+    across = np.linalg.norm(rays[:, :2], axis=1)
+    down = np.maximum(-rays[:, 2], across / STEEPEST_RAY)
+    down = np.maximum(down, np.finfo(np.float64).tiny)
+    way = rays[:, :2] / down[:, None]
+    steepest = np.linalg.norm(way, axis=1).max()
+    return Reach(
+        -rest[:2] / rest[2], way.min(axis=0), way.max(axis=0), float(steepest), bool((down > -rays[:, 2]).any())
+    )
+
+
+def deviation_bounds(
+    reach: Reach, depths: tuple[float, float], reference: float, pixel: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Smallest and largest distance of a landing from its place at rest, ``[2]`` each [pixels]."""
+    ends = np.array([depth * way for depth in depths for way in (reach.low, reach.high)])
+    shift = reference * reach.rest
+    return (ends.min(axis=0) - shift) / pixel, (ends.max(axis=0) - shift) / pixel
+
+
+def lattice_over(low: np.ndarray, high: np.ndarray, resolution: tuple[int, int], step: float) -> Lattice:
+    """Cells whose light can land in the map, ``low`` and ``high`` being the bounds of the deviation [pixels].
+
+    Raises
+    ------
+    InputError
+        If there are more than can be counted, or gone through.
+    """
+    size = np.asarray(resolution, dtype=np.float64)
+    # A cell lands within its square at rest plus the deviation.
+    first = np.floor((0.0 - high) / step)
+    last = np.ceil((size - low) / step)
+    count = last - first
+    if not np.isfinite(count).all() or np.abs([first, last]).max() > INDEX_BOUND or count.prod() > MOST_CELLS:
+        raise InputError(
+            f"map: lighting it takes {count[0]:.3g} x {count[1]:.3g} cells of water, more than can be gone through; "
+            "light spreads too far for pixels this small: make the pixels larger, the water shallower or calmer"
+        )
+    return Lattice((int(first[0]), int(first[1])), (int(count[0]), int(count[1])), step)
