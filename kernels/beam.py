@@ -14,10 +14,11 @@ import warp as wp
 
 from .deposit import ACCUMULATOR, FLUX
 from .lattice import Lattice, at_rest, deviation, on_water, pixel_base, pixel_fraction, to_rest
-from .ledger import ABSORBED, EMITTED, OUTSIDE_MAP, REFLECTED, make_count_unlanded, tally
+from .ledger import make_book_landed, make_count_unlanded
 from .patch import BORDER, arrived_plane, integral_weights, make_deposit_patch, plane_bend, plane_mean
 from .photon import LANDED, LANDED_ON_OBJECT, Scene, SunSample, make_photon
 from .spec import Spec
+from .wave_table import make_water_on_lattice
 
 BEND_TOLERANCE = 0.01
 """Bend of the landing map [pixels] that is left inside one part of a cell."""
@@ -33,6 +34,7 @@ TORN_BEND = 1.0
 def make_corners(spec: Spec) -> wp.Kernel:
     """Land the corners of a strip."""
     photon = make_photon(spec)
+    water_on_lattice = make_water_on_lattice(spec)
     fresnel, breaks = spec.fresnel, spec.breaks
     absorbs = spec.attenuation != "none"
     channels = spec.channels
@@ -46,6 +48,8 @@ def make_corners(spec: Spec) -> wp.Kernel:
         sun: int,
         lattice: Lattice,
         first_row: int,
+        column_waves: wp.array2d[wp.vec2],
+        row_waves: wp.array2d[wp.vec2],
         # Out:
         planes_out: wp.array3d[float],
         state_out: wp.array2d[wp.uint8],
@@ -55,7 +59,8 @@ def make_corners(spec: Spec) -> wp.Kernel:
         light = suns[sun]
         index = wp.vec2i(lattice.first[0] + column - wp.static(BORDER), first_row + row - wp.static(BORDER))
         water = on_water(lattice, at_rest(lattice, index, 0.0), light.rest_shift)
-        result = photon(scene, light.direction, water[0], water[1])
+        z = water_on_lattice(scene, column_waves, row_waves, column, row, water)
+        result = photon(scene, light.direction, water, z)
         offset = deviation(lattice, result.distance, result.direction, light.rest_shift)
         planes_out[0, row, column] = offset[0]
         planes_out[1, row, column] = offset[1]
@@ -80,26 +85,6 @@ def common_state(state: wp.array2d[wp.uint8], row: int, column: int, first: int,
             if int(state[row + j, column + i]) != common:
                 common = int(0)
     return common
-
-
-@functools.cache
-def make_book_landed(spec: Spec) -> wp.Function:
-    """Enter a landed cell into the ledger: what it took in, what it lost on the way, what fell outside the map."""
-    flux_type = FLUX[spec.channels]
-    channels = spec.channels
-
-    @wp.func
-    def book_landed(
-        ledger: wp.array2d[wp.float64], bin: int, incident: float, transmitted: float, arrived: flux_type,
-        inside: flux_type,
-    ):  # fmt: skip
-        for c in range(wp.static(channels)):
-            tally(ledger, EMITTED * wp.static(channels) + c, bin, incident)
-            tally(ledger, REFLECTED * wp.static(channels) + c, bin, incident - transmitted)
-            tally(ledger, ABSORBED * wp.static(channels) + c, bin, transmitted - arrived[c])
-            tally(ledger, OUTSIDE_MAP * wp.static(channels) + c, bin, arrived[c] - inside[c])
-
-    return book_landed
 
 
 @functools.cache

@@ -9,12 +9,12 @@ import functools
 
 import warp as wp
 
-from .beam import make_book_landed
 from .deposit import FLUX
 from .lattice import Lattice, at_rest, deviation, on_water
-from .ledger import make_count_unlanded
+from .ledger import make_book_landed, make_count_unlanded
 from .photon import LANDED, Scene, SunSample, make_photon
 from .spec import Spec
+from .wave_table import make_water_on_lattice
 
 
 @wp.func
@@ -27,6 +27,7 @@ def box_overlap(distance: float) -> float:
 def make_intersections(spec: Spec) -> wp.Kernel:
     """The pre-pass: where the light of each sample lands, and how much of it there is."""
     photon = make_photon(spec)
+    water_on_lattice = make_water_on_lattice(spec)
     book_landed = make_book_landed(spec)
     count_unlanded = make_count_unlanded(spec)
     flux_type = FLUX[spec.channels]
@@ -39,6 +40,8 @@ def make_intersections(spec: Spec) -> wp.Kernel:
         suns: wp.array[SunSample],
         sun: int,
         lattice: Lattice,
+        column_waves: wp.array2d[wp.vec2],
+        row_waves: wp.array2d[wp.vec2],
         # Out:
         landing_out: wp.array2d[wp.vec2],
         flux_out: wp.array2d[flux_type],
@@ -50,7 +53,8 @@ def make_intersections(spec: Spec) -> wp.Kernel:
         index = wp.vec2i(lattice.first[0] + column, lattice.first[1] + row)
         rest = at_rest(lattice, index, 0.5)
         water = on_water(lattice, rest, light.rest_shift)
-        result = photon(scene, light.direction, water[0], water[1])
+        z = water_on_lattice(scene, column_waves, row_waves, column, row, water)
+        result = photon(scene, light.direction, water, z)
         offset = deviation(lattice, result.distance, result.direction, light.rest_shift)
         flux = flux_type()
         inside = box_inside(float(index[0]) + 0.5 + offset[0], lattice.map[0])

@@ -8,6 +8,7 @@ import functools
 
 import warp as wp
 
+from .deposit import FLUX
 from .photon import BLOCKED, DRY, LEFT, UNLIT
 from .spec import Spec
 
@@ -60,3 +61,23 @@ def make_count_unlanded(spec: Spec) -> wp.Function:
                     tally(ledger, DROPPED * wp.static(channels) + c, bin, incident)
 
     return count_unlanded
+
+
+@functools.cache
+def make_book_landed(spec: Spec) -> wp.Function:
+    """Enter a landed cell into the ledger: what it took in, what it lost on the way, what fell outside the map."""
+    flux_type = FLUX[spec.channels]
+    channels = spec.channels
+
+    @wp.func
+    def book_landed(
+        ledger: wp.array2d[wp.float64], bin: int, incident: float, transmitted: float, arrived: flux_type,
+        inside: flux_type,
+    ):  # fmt: skip
+        for c in range(wp.static(channels)):
+            tally(ledger, EMITTED * wp.static(channels) + c, bin, incident)
+            tally(ledger, REFLECTED * wp.static(channels) + c, bin, incident - transmitted)
+            tally(ledger, ABSORBED * wp.static(channels) + c, bin, transmitted - arrived[c])
+            tally(ledger, OUTSIDE_MAP * wp.static(channels) + c, bin, arrived[c] - inside[c])
+
+    return book_landed

@@ -206,8 +206,7 @@ def make_land(spec: Spec) -> wp.Function:
 
 @functools.cache
 def make_photon(spec: Spec) -> wp.Function:
-    """Follow one point of the surface from the sun to the receiver: surface, shadow, refraction, landing."""
-    water_at = HEIGHT_AND_SLOPE[spec.water]
+    """Follow the light at one point of the surface: shadow, refraction, landing, what is lost on the way."""
     lit = make_lit(spec)
     wet = make_wet(spec)
     land = make_land(spec)
@@ -216,9 +215,9 @@ def make_photon(spec: Spec) -> wp.Function:
     shades = spec.self_shadow or spec.shore or spec.occluders
 
     @wp.func
-    def photon(scene: Scene, sun: wp.vec3, x: float, y: float) -> Photon:
-        z = water_at(scene.water.surface, x, y)
-        origin = wp.vec3(x, y, z[0])
+    def photon(scene: Scene, sun: wp.vec3, at: wp.vec2, z: wp.vec3) -> Photon:
+        """``z`` is the water's displacement and slope at the point ``at``."""
+        origin = wp.vec3(at[0], at[1], z[0])
         slope = wp.vec2(z[1], z[2])
         point = wp.vec2(0.0, 0.0)
         incident = facing(sun, slope)

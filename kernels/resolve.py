@@ -5,12 +5,16 @@ import functools
 import warp as wp
 
 from .deposit import ACCUMULATOR
+from .optics import facing
 from .photon import Scene, SunSample, share_lit
 from .spec import Spec
 from .surface import HEIGHT_AND_SLOPE
 
 DRY_PARTS = 4
 """Parts of a pixel along each side in which its dry share is taken."""
+
+SURE = 3.0
+"""Pixels around a pixel that must be all wet, or all dry, by the slope at its middle, for it to be sure."""
 
 
 @functools.cache
@@ -45,6 +49,12 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
     water_at = HEIGHT_AND_SLOPE[spec.water]
     terrain_at = HEIGHT_AND_SLOPE[spec.receiver if spec.receiver in HEIGHT_AND_SLOPE else "waves"]
 
+    @wp.func
+    def dry_share(scene: Scene, at: wp.vec2, size: wp.vec2) -> float:
+        ground = terrain_at(scene.receiver.terrain, at[0], at[1])
+        water = water_at(scene.water.surface, at[0], at[1])
+        return share_lit(ground[0] - water[0], wp.vec2(ground[1] - water[1], ground[2] - water[2]), size)
+
     @wp.kernel(module="unique", enable_backward=False)
     def dry_land(
         # In:
@@ -60,19 +70,26 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
     ):
         """One thread a pixel; launch dims (rows, columns)."""
         row, column = wp.tid()
-        part = wp.vec2(pixel[0] / float(wp.static(DRY_PARTS)), pixel[1] / float(wp.static(DRY_PARTS)))
+        middle = wp.vec2((float(column) + 0.5) * pixel[0], (float(row) + 0.5) * pixel[1])
+        # Most pixels are wholly wet or wholly dry by a margin; only the others are looked at in parts.
+        share = dry_share(scene, middle, wp.static(SURE) * pixel)
+        if share <= 0.0:
+            return
+        parts = wp.static(DRY_PARTS)
+        part = pixel / float(parts)
         light = float(0.0)
-        for j in range(wp.static(DRY_PARTS)):
-            for i in range(wp.static(DRY_PARTS)):
+        for j in range(parts):
+            for i in range(parts):
                 x = float(column) * pixel[0] + (float(i) + 0.5) * part[0]
                 y = float(row) * pixel[1] + (float(j) + 0.5) * part[1]
-                ground = terrain_at(scene.receiver.terrain, x, y)
-                water = water_at(scene.water.surface, x, y)
-                dry = share_lit(ground[0] - water[0], wp.vec2(ground[1] - water[1], ground[2] - water[2]), part)
+                dry = float(1.0)
+                if share < 1.0:
+                    dry = dry_share(scene, wp.vec2(x, y), part)
                 if dry > 0.0:
+                    ground = terrain_at(scene.receiver.terrain, x, y)
                     for k in range(suns.shape[0]):
                         sun = suns[k].direction
-                        light += dry * wp.max(0.0, ground[1] * sun[0] + ground[2] * sun[1] - sun[2])
+                        light += dry * wp.max(0.0, facing(sun, wp.vec2(ground[1], ground[2])))
         light /= float(suns.shape[0]) * float(wp.static(DRY_PARTS)) * float(wp.static(DRY_PARTS))
         if light > 0.0:
             for c in range(colours):

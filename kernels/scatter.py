@@ -4,19 +4,20 @@ import functools
 
 import warp as wp
 
-from .beam import make_book_landed
 from .deposit import ACCUMULATOR, FLUX
 from .lattice import Lattice, at_rest, deviation, on_water, pixel_base, pixel_fraction, to_rest
-from .ledger import make_count_unlanded
+from .ledger import make_book_landed, make_count_unlanded
 from .photon import LANDED, LANDED_ON_OBJECT, Scene, SunSample, make_photon
 from .spec import Spec
 from .splat import make_deposit_box
+from .wave_table import make_water_on_lattice
 
 
 @functools.cache
 def make_scatter(spec: Spec) -> wp.Kernel:
     """Splat the photons of a strip."""
     photon = make_photon(spec)
+    water_on_lattice = make_water_on_lattice(spec)
     deposit_box = make_deposit_box(spec.accumulate, spec.channels)
     book_landed = make_book_landed(spec)
     count_unlanded = make_count_unlanded(spec)
@@ -33,6 +34,8 @@ def make_scatter(spec: Spec) -> wp.Kernel:
         lattice: Lattice,
         first_row: int,
         footprint: wp.vec2,
+        column_waves: wp.array2d[wp.vec2],
+        row_waves: wp.array2d[wp.vec2],
         # Out:
         map_out: wp.array[dtype],
         ledger_out: wp.array2d[wp.float64],
@@ -51,7 +54,8 @@ def make_scatter(spec: Spec) -> wp.Kernel:
             if not share > 0.0:
                 return
         water = on_water(lattice, rest, light.rest_shift)
-        result = photon(scene, light.direction, water[0], water[1])
+        z = water_on_lattice(scene, column_waves, row_waves, column, row, water)
+        result = photon(scene, light.direction, water, z)
         bin = row * 31 + column
         if result.state != LANDED and result.state != LANDED_ON_OBJECT:
             count_unlanded(ledger_out, bin, result.state, share * result.incident, share * result.transmitted)

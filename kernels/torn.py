@@ -10,11 +10,10 @@ import functools
 
 import warp as wp
 
-from .beam import make_book_landed
 from .coverage import make_deposit_triangle
 from .deposit import ACCUMULATOR, FLUX
 from .lattice import Lattice, at_rest, on_water, pixel_base, pixel_fraction, to_rest
-from .ledger import EMITTED, OVER_LIT, SHADED, make_count_unlanded, tally
+from .ledger import EMITTED, OVER_LIT, SHADED, make_book_landed, make_count_unlanded, tally
 from .optics import facing, refract_at_slope
 from .photon import LANDED, LANDED_ON_OBJECT, LOST, Photon, Scene, SunSample, make_land, make_lit, make_wet
 from .spec import Spec

@@ -218,12 +218,12 @@ BAD_SCENES = {
     "NaN in a height map": (
         HEIGHT_MAP,
         'height_map = { file = "nan.npy", origin = [0, 0], size = [1, 1] }',
-        ["nan.npy"],
+        ["water.height_map", "row 3, column 4"],
     ),
     "infinity in a height map": (
         HEIGHT_MAP,
         'height_map = { file = "inf.npy", origin = [0, 0], size = [1, 1] }',
-        ["inf.npy"],
+        ["water.height_map", "row 3, column 4"],
     ),
     "a mesh that is missing": ("plane = 0.0", 'mesh = "no.obj"', ["no.obj"]),
     "a mesh without triangles": ("plane = 0.0", 'mesh = "points.obj"', ["points.obj", "triangle"]),

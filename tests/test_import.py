@@ -23,9 +23,21 @@ HEAVY = {"OpenEXR", "matplotlib", "PIL", "pyvista", "rasterio", "vtk", "vtkmodul
 # The outermost layer, which nothing else of the package may know.
 OUTER = {"warp_caustics.__main__", "warp_caustics.cli", "warp_caustics.view"}
 
+
+def _module(path: Path) -> str:
+    """Name of the module of a file of the package."""
+    return ".".join(["warp_caustics", *path.relative_to(PACKAGE).with_suffix("").parts]).removesuffix(".__init__")
+
+
+FILES = sorted(PACKAGE.rglob("*.py"))
+MODULES = [
+    *(_module(path) for path in FILES),
+    *(f"warp_caustics.kernels.{path.stem}" for path in KERNELS.glob("*.py") if path.stem != "__init__"),
+]
+
 # Runs in a fresh process: what is loaded and which settings change, by an import of the package and of all its modules.
 PROBE = """
-import importlib, json, locale, logging, os, pkgutil, random, signal, sys, warnings
+import importlib, json, locale, logging, os, random, signal, sys, warnings
 import numpy as np
 import warp as wp
 
@@ -48,9 +60,7 @@ before = settings()
 loaded = set(sys.modules)
 import warp_caustics
 first = sorted(set(sys.modules) - loaded)
-names = [module.name for module in pkgutil.walk_packages(warp_caustics.__path__, "warp_caustics.")]
-inner = [name for name in names if not name.startswith(("warp_caustics.cli", "warp_caustics.__main__"))]
-for name in inner:
+for name in json.loads(sys.argv[1]):
     importlib.import_module(name)
 after = settings()
 import warp_caustics.cli  # rich draws random numbers when it is imported
@@ -65,7 +75,10 @@ print(json.dumps({
 
 @pytest.fixture(scope="module")
 def probe() -> dict:
-    done = subprocess.run([sys.executable, "-c", PROBE], capture_output=True, text=True, check=False, cwd=ROOT.parent)
+    names = json.dumps([name for name in MODULES if not _within(name, {"warp_caustics.__main__", "warp_caustics.cli"})])
+    done = subprocess.run(
+        [sys.executable, "-c", PROBE, names], capture_output=True, text=True, check=False, cwd=ROOT.parent
+    )
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
@@ -111,9 +124,9 @@ def test_kernels_know_warp_alone(path):
         assert name.startswith("warp_caustics.kernels") or name.partition(".")[0] in KERNEL_IMPORTS, name
 
 
-@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.py")), ids=lambda path: str(path.relative_to(PACKAGE)))
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_nothing_inside_knows_the_outer_layer(path):
-    module = ".".join(["warp_caustics", *path.relative_to(PACKAGE).with_suffix("").parts]).removesuffix(".__init__")
+    module = _module(path)
     if _within(module, OUTER):
         return
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]

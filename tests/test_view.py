@@ -32,21 +32,23 @@ origin = [100.0, -50.0]
 size = [2.0, 1.0]
 resolution = [32, 16]
 """
-TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0.3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+TETRAHEDRON = "v 100 -50 0\nv 101 -50 0\nv 100 -49 0\nv 100 -50 0.3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 RECEIVERS = {
     "plane": "plane = 0.0",
     "terrain": "terrain = { base = 20.0, slope = [-0.2, 0.0], waves = [] }",
     "mesh": 'mesh = "rock.obj"',
-    "plane with an object": 'plane = 0.0\nobjects = [{ mesh = "rock.obj", translate = [100.5, -49.8, 0.0] }]',
+    "plane with an object": 'plane = 0.0\nobjects = [{ mesh = "rock.obj", translate = [0.5, 0.2, 0.0] }]',
 }
 ROWS, COLUMNS = 16, 32
 # Of 255, between the halves of a picture of which one is lit: far above what shading and the water could do.
 CLEAR_DIFFERENCE = 20.0
+WINDOW = (320, 200)  # pixels; large enough to tell the halves of a map apart
 
 
 @pytest.fixture
-def drawing() -> None:
-    """Skip where VTK cannot draw, and say what it lacks."""
+def drawing(monkeypatch) -> None:
+    """Draw small pictures; skip where VTK cannot draw, and say what it lacks."""
+    monkeypatch.setattr(view_module, "WINDOW", WINDOW)
     try:
         check_can_show(window=False)
     except wc.RenderError as error:

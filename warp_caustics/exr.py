@@ -180,8 +180,6 @@ def read_exr(
 
 def _single_part(exr: Any, shown: str) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
     """Header and channels of an open file that must have one part."""
-    if not exr.parts:
-        raise InputError(f"{shown!r} is damaged: its pixels cannot be read")
     if len(exr.parts) > 1:
         raise InputError(f"{shown!r} has {len(exr.parts)} parts; expected one")
     return dict(exr.header()), {name: channel.pixels for name, channel in exr.channels().items()}
@@ -211,10 +209,9 @@ def _is_cut_short(data: bytes) -> bool:
     first = int.from_bytes(data[table : table + 8], "little")
     if not table + 8 <= first <= len(data) or (first - table) % 8:
         return True
-    offsets = np.frombuffer(data, "<u8", (first - table) // 8, table)
-    last = int(offsets.max())
+    last = int(np.frombuffer(data, "<u8", (first - table) // 8, table).max())
     packed = int.from_bytes(data[last + 4 : last + _CHUNK_LEADER], "little")
-    return int(offsets.min()) < first or last + _CHUNK_LEADER + packed > len(data)
+    return last + _CHUNK_LEADER + packed > len(data)
 
 
 def _to_channels(image: npt.NDArray[np.float32]) -> dict[str, npt.NDArray[np.float32]]:

@@ -59,6 +59,11 @@ class Facts:
     reasons: tuple[Reason, ...]
     warnings: tuple[str, ...] = field(default=())
 
+    @property
+    def waves(self) -> int:
+        """Count of the water's waves."""
+        return len(self.scene.water.waves or ())
+
 
 def gather_facts(scene: Scene, assets: Assets) -> Facts:
     """Derive the facts of a scene.
@@ -164,13 +169,14 @@ def _specify(
     faces_away = bool((slopes @ suns[:, :2].T - suns[:, 2] < 0.0).any())
     self_shadow = faces_away and shadow is not False
     slope = float(np.linalg.norm(slopes, axis=1).max())
-    exits = slope * steepest > 1.0
-    tears = kind in ("waves", "grid") and wide.slope * steepest >= 1.0
-    over = wide.highest > -amplitude
+    exits = bool(slope * steepest > 1.0)
+    tears = kind in ("waves", "grid") and bool(wide.slope * steepest >= 1.0)
+    over = bool(wide.highest > -amplitude)
     objects = assets.objects is not None
     shore = kind in ("waves", "grid") and over
     level = scene.water.level
-    occluders = any(m is not None and m.vertices[:, 2].max() > level - amplitude for m in (assets.mesh, assets.objects))
+    meshes = [mesh for mesh in (assets.mesh, assets.objects) if mesh is not None]
+    occluders = any(bool(mesh.vertices[:, 2].max() > level - amplitude) for mesh in meshes)
     by_depth = medium.jerlov is not None
     absorbs = by_depth or any(_attenuation(scene))
     coloured = by_depth or (absorbs and isinstance(medium.absorption, tuple))

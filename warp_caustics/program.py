@@ -11,7 +11,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from .kernels.wave_table import wave_table
+
 if TYPE_CHECKING:
+    from .kernels.spec import Spec
     from .window import Lattice
 
 
@@ -54,6 +57,45 @@ class Pass:
     does: str
     kernel: Callable[[], Any]
     dim: Callable[[int], tuple[int, ...]]
+
+
+def wave_pass(spec: Spec, lattice: Lattice, waves: int, rows: int, border: int, offset: float) -> WavePass:
+    """Plan the tables of a lattice's waves, or nothing where the water is a height map.
+
+    Parameters
+    ----------
+    spec : Spec
+        Of the scene.
+    lattice : Lattice
+        The water's cells.
+    waves : int
+        Count of the waves.
+    rows : int
+        Rows of points in a strip.
+    border : int
+        Points beyond the last of a strip's cells, both sides together.
+    offset : float
+        Of the first point from the first cell's corner [cells].
+    """
+    if spec.water != "waves":
+        return WavePass((), (), {})
+    columns = lattice.count[0] + border
+    return WavePass(
+        (Pass("waves", "sines of each row and column of points", lambda: wave_table,
+              lambda strip: (max(columns, strip + border),)),),
+        (Buffer("column_waves", "vec2", (columns, waves), 8, per_lane=True),
+         Buffer("row_waves", "vec2", (rows + border, waves), 8, per_lane=True)),
+        {"offset": offset},
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class WavePass:
+    """The pass, buffers and values of :func:`wave_pass`, to be joined to a program's own."""
+
+    passes: tuple[Pass, ...]
+    buffers: tuple[Buffer, ...]
+    values: Mapping[str, Any]
 
 
 @dataclass(frozen=True)

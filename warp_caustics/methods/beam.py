@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels.beam import make_cells, make_corners
 from ..kernels.patch import BORDER, flux_planes
 from ..kernels.torn import make_torn
-from ..program import Buffer, Pass, Program
+from ..program import Buffer, Pass, Program, wave_pass
 from ..window import lattice_over
 
 if TYPE_CHECKING:
@@ -27,13 +27,15 @@ def beam(facts: Facts) -> Program:
     columns, rows = lattice.count[0], min(STRIP_ROWS, lattice.count[1])
     beside = 1 + 2 * BORDER
     corners = (rows + beside, columns + beside)
+    waves = wave_pass(spec, lattice, facts.waves, rows, beside, -float(BORDER))
     passes = [
+        *waves.passes,
         Pass("corners", "waves, refraction, landing at the corners of cells", lambda: make_corners(spec),
              lambda strip: (strip + beside, columns + beside)),
         Pass("cells", "beam: cells cut where they bend, clipped to pixels, added up",
              lambda: make_cells(spec, settings.refine), lambda strip: (strip, columns)),
     ]  # fmt: skip
-    buffers = [Buffer("planes", "float32", (2 + flux_planes(spec), *corners), 4, per_lane=True)]
+    buffers = [*waves.buffers, Buffer("planes", "float32", (2 + flux_planes(spec), *corners), 4, per_lane=True)]
     if spec.breaks:
         passes.append(
             Pass("torn", "cells at an edge, followed ray by ray", lambda: make_torn(spec), lambda strip: (strip, columns))
@@ -45,6 +47,7 @@ def beam(facts: Facts) -> Program:
         strip_rows=rows,
         passes=tuple(passes),
         buffers=tuple(buffers),
+        values=waves.values,
         accumulate=spec.accumulate,
         settings={"samples_per_pixel": settings.samples_per_pixel, "refine": settings.refine},
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels.gather import make_columns, make_intersections, make_rows
-from ..program import Buffer, Pass, Program
+from ..program import Buffer, Pass, Program, wave_pass
 from ..window import Lattice
 
 if TYPE_CHECKING:
@@ -43,10 +43,12 @@ def gather(facts: Facts) -> Program:
     lattice = Lattice((-half, -(m // 2)), (columns + 2 * half, rows + m), 1.0)
     grid = (lattice.count[1], lattice.count[0])
     flux = f"vec{spec.channels}"
+    waves = wave_pass(spec, lattice, facts.waves, grid[0], 0, 0.5)
     return Program(
         lattice=lattice,
         strip_rows=lattice.count[1],
         passes=(
+            *waves.passes,
             Pass("intersections", "waves, refraction, landing of each sample", lambda: make_intersections(spec),
                  lambda _: grid),
             Pass("rows", f"gather pass 1: {n} samples in a row, for {m + 1} pixels of a column",
@@ -55,11 +57,12 @@ def gather(facts: Facts) -> Program:
                  lambda _: (rows, columns)),
         ),
         buffers=(
+            *waves.buffers,
             Buffer("landing", "vec2", grid, 8),
             Buffer("flux", flux, grid, 4 * spec.channels),
             Buffer("channel", flux, (m + 1, rows + m, columns), 4 * spec.channels),
         ),
-        values={"n": n, "m": m},
+        values={**waves.values, "n": n, "m": m},
         settings={"n": n, "m": m},
         banded=False,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.scatter import make_scatter
-from ..program import Pass, Program
+from ..program import Pass, Program, wave_pass
 from ..window import lattice_over
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def photon(facts: Facts) -> Program:
     spare = max(0.0, 0.5 * (width - step))
     lattice = lattice_over(low - spare, high + spare, facts.scene.map.resolution, step)
     columns, rows = lattice.count[0], min(STRIP_ROWS, lattice.count[1])
+    waves = wave_pass(spec, lattice, facts.waves, rows, 0, 0.5)
     scatter = Pass(
         "scatter", "waves, refraction, landing, splat of each photon", lambda: make_scatter(spec),
         lambda strip: (strip, columns),
@@ -37,9 +38,9 @@ def photon(facts: Facts) -> Program:
     return Program(
         lattice=lattice,
         strip_rows=rows,
-        passes=(scatter,),
-        buffers=(),
-        values={"footprint": (width, width)},
+        passes=(*waves.passes, scatter),
+        buffers=waves.buffers,
+        values={**waves.values, "footprint": (width, width)},
         accumulate=spec.accumulate,
         settings={"photons_per_pixel": settings.photons_per_pixel, "footprint": settings.footprint,
                   "projection": settings.projection},

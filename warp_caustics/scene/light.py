@@ -45,7 +45,7 @@ class Sun(Model):
     """The sun: its direction one of two ways, its irradiance and its size."""
 
     direction: Annotated[Triple, AfterValidator(_downward_unit)] = Field(
-        default=(0.0, 0.0, -1.0),
+        default=None,  # never stays: `rules` asks for one of the two ways, and `_place` turns the other into this one
         description="the way light travels; brought to length 1. Either this, or elevation and azimuth",
     )
     elevation: Elevation | None = Field(default=None, description="height of the sun above the horizon [degrees]")
@@ -77,6 +77,8 @@ class Sun(Model):
             object.__setattr__(
                 self, "direction", _downward_unit((0.0 - towards[0], 0.0 - towards[1], 0.0 - towards[2]))
             )
+        if self.direction is None:
+            return self  # refused by `rules`
         x, y, z = self.direction
         lowest = math.degrees(math.atan2(-z, math.hypot(x, y))) - self.angular_diameter / 2.0
         if lowest <= 0.0:

@@ -100,7 +100,8 @@ def exactly_one(given: Mapping[str, Any], names: tuple[str, ...], not_yet: Itera
 
 def expectation(field: FieldInfo) -> str:
     """Return in words what a field expects."""
-    return _said((field.annotation, *field.metadata)) or "a table"
+    said = _said((field.annotation, *field.metadata))
+    return said or ("a list of tables" if get_origin(field.annotation) is tuple else "a table")
 
 
 def _said(parts: tuple[Any, ...]) -> str | None:

@@ -26,7 +26,7 @@ class ClosedTerrain(Model):
 
     base: Number = Field(description="z at x = y = 0, ripples aside [m]")
     slope: Pair = Field(default=(0.0, 0.0), description="(sx, sy), rise over run")
-    waves: tuple[TerrainWave, ...] = Field(default=(), description="list of ripples, which add up")
+    waves: tuple[TerrainWave, ...] = Field(default=(), description="ripples, which add up")
 
 
 class TerrainFile(HeightFile):

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field
 from warp_caustics.scene.faults import listed, refusal
 from warp_caustics.scene.formats import GEOREFERENCED_SUFFIXES, HEIGHT_SUFFIXES, KEYED_SUFFIXES, suffix
 from warp_caustics.scene.model import Model, exactly_one
-from warp_caustics.scene.values import Extent, HeightPath, Number, Pair, Text, one_of, truth
+from warp_caustics.scene.values import Extent, HeightPath, Number, Pair, Said, Text, one_of, truth
 
 
 def _not_zero(wavevector: tuple[float, float]) -> tuple[float, float]:
@@ -84,8 +84,8 @@ class Water(Model):
     }
 
     level: Number = Field(description="z of the surface at rest [m]")
-    waves: tuple[Wave, ...] | None = Field(
-        default=None, description="list of waves, which add up; an empty list is flat water"
+    waves: Annotated[tuple[Wave, ...], Said("a list of tables")] | None = Field(
+        default=None, description="waves, which add up; an empty list is flat water"
     )
     height_map: HeightMap | None = Field(default=None, description="instead of `waves`: displacement from `level`")
     self_shadow: Annotated[Literal["auto"] | bool, one_of("auto", other=truth, or_else=", true or false")] = Field(

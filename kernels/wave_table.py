@@ -1,0 +1,89 @@
+"""Waves on a lattice: sines of sums from sines of the parts, tabulated once for each row and each column.
+
+sin(A + B) = sin A cos B + cos A sin B, with A from the column and B from the row: a lattice point costs four products
+a wave and no sine. The tables are made in float64, so that neither a wide lattice nor a high wave number loses digits.
+"""
+
+import functools
+
+import warp as wp
+
+from .lattice import Lattice
+from .photon import Scene, SunSample
+from .spec import Spec
+from .surface import HEIGHT_AND_SLOPE
+from .waves import Wave
+
+
+@wp.func
+def turn(angle: wp.float64) -> wp.vec2:
+    """Cosine and sine of an angle, taken in float64."""
+    return wp.vec2(float(wp.cos(angle)), float(wp.sin(angle)))
+
+
+@wp.kernel(enable_backward=False)
+def wave_table(
+    # In:
+    scene: Scene,
+    suns: wp.array[SunSample],
+    sun: int,
+    lattice: Lattice,
+    first_row: int,
+    offset: float,
+    # Out:
+    column_waves_out: wp.array2d[wp.vec2],
+    row_waves_out: wp.array2d[wp.vec2],
+):
+    """One thread a column or row; launch dim the larger count; ``offset`` is of the first point, in cells.
+
+    ``column_waves_out[i, w]`` is (cos, sin) of k_x x_i + phase, ``row_waves_out[j, w]`` of k_y y_j.
+    """
+    i = wp.tid()
+    shift = suns[sun].rest_shift
+    step = wp.float64(lattice.step)
+    for w in range(scene.water.surface.waves.shape[0]):
+        wave = scene.water.surface.waves[w]
+        if i < column_waves_out.shape[0]:
+            cell = wp.float64(lattice.first[0] + i) + wp.float64(offset)
+            x = cell * step * wp.float64(lattice.pixel[0]) - wp.float64(shift[0])
+            column_waves_out[i, w] = turn(wp.float64(wave.wavevector[0]) * x + wp.float64(wave.phase))
+        if i < row_waves_out.shape[0]:
+            cell = wp.float64(first_row + i) + wp.float64(offset)
+            y = cell * step * wp.float64(lattice.pixel[1]) - wp.float64(shift[1])
+            row_waves_out[i, w] = turn(wp.float64(wave.wavevector[1]) * y)
+
+
+@wp.func
+def wave_lattice_sum(
+    waves: wp.array[Wave], column_waves: wp.array2d[wp.vec2], row_waves: wp.array2d[wp.vec2], column: int, row: int
+) -> wp.vec3:
+    """Displacement and slope (z, z_x, z_y) at a lattice point, from the tables."""
+    total = wp.vec3(0.0, 0.0, 0.0)
+    for w in range(waves.shape[0]):
+        wave = waves[w]
+        a = column_waves[column, w]
+        b = row_waves[row, w]
+        rise = wave.amplitude * (a[0] * b[0] - a[1] * b[1])
+        total += wp.vec3(
+            wave.amplitude * (a[1] * b[0] + a[0] * b[1]), rise * wave.wavevector[0], rise * wave.wavevector[1]
+        )
+    return total
+
+
+@functools.cache
+def make_water_on_lattice(spec: Spec) -> wp.Function:
+    """Height and slope of the water at a lattice point: from the tables of its waves, or from its height map."""
+    water_at = HEIGHT_AND_SLOPE[spec.water]
+    tabled = spec.water == "waves"
+
+    @wp.func
+    def water_on_lattice(
+        scene: Scene, column_waves: wp.array2d[wp.vec2], row_waves: wp.array2d[wp.vec2], column: int, row: int,
+        at: wp.vec2,
+    ) -> wp.vec3:  # fmt: skip
+        if wp.static(tabled):
+            return wave_lattice_sum(scene.water.surface.waves, column_waves, row_waves, column, row)
+        else:
+            return water_at(scene.water.surface, at[0], at[1])
+
+    return water_on_lattice
