@@ -15,15 +15,18 @@ import warp as wp
 from .deposit import ACCUMULATOR, FLUX
 from .lattice import Lattice, at_rest, deviation, on_water, pixel_base, pixel_fraction, to_rest
 from .ledger import make_book_landed, make_count_unlanded
-from .patch import BORDER, arrived_plane, integral_weights, make_deposit_patch, plane_bend, plane_mean
+from .patch import BORDER, arrived_plane, integral_weights, make_deposit_patch, plane_bend, plane_mean, thickness
 from .photon import LANDED, LANDED_ON_OBJECT, Scene, SunSample, make_photon
 from .spec import Spec
 from .wave_table import make_water_on_lattice
 
-BEND_TOLERANCE = 0.01
-"""Bend of the landing map [pixels] that is left inside one part of a cell."""
+BEND_SHARE = 0.005
+"""Bend that is left inside one part of a cell, as a share of the cell's width where it lands."""
 
-FINEST = 8
+BEND_LEAST, BEND_MOST = 0.0005, 0.005
+"""Bounds of the bend that is left [pixels]."""
+
+FINEST = 16
 """Parts of a cell along each side at most."""
 
 TORN_BEND = 1.0
@@ -144,7 +147,9 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
             bend = float(0.0)
             if cubic == 1:
                 bend = wp.max(plane_bend(planes, 0, row, column), plane_bend(planes, 1, row, column))
-            n = wp.clamp(int(wp.ceil(wp.sqrt(bend / wp.static(BEND_TOLERANCE)))), 1, wp.static(FINEST))
+            thick = thickness(planes, row, column, high - low)
+            left = wp.clamp(wp.static(BEND_SHARE) * thick, wp.static(BEND_LEAST), wp.static(BEND_MOST))
+            n = wp.clamp(int(wp.ceil(wp.sqrt(bend / left))), 1, wp.static(FINEST))
             if wp.static(edges):
                 if bend > wp.static(TORN_BEND):
                     common = int(0)

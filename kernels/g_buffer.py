@@ -34,7 +34,7 @@ class Resolve:
 
 @wp.func
 def face_normal(a: wp.vec3, b: wp.vec3, c: wp.vec3) -> wp.vec3:
-    """Normal of a triangle, of length 1, towards where it runs anticlockwise; zero for a degenerate one."""
+    """Take a triangle's unit normal, to the side that sees it run anticlockwise; zero for a degenerate one."""
     return wp.normalize(wp.cross(b - a, c - a))
 
 

@@ -117,6 +117,19 @@ def plane_bend(planes: wp.array3d[float], plane: int, row: int, column: int) -> 
     return wp.max(worst, 0.25 * wp.abs(twist))
 
 
+@wp.func
+def thickness(planes: wp.array3d[float], row: int, column: int, side: wp.vec2) -> float:
+    """Width of a landed cell across its longer diagonal [pixels]; nothing at a focus, where it is a sliver."""
+    a = wp.vec2(planes[0, row + 1, column + 1], planes[1, row + 1, column + 1])
+    b = wp.vec2(planes[0, row + 1, column + 2], planes[1, row + 1, column + 2])
+    c = wp.vec2(planes[0, row + 2, column + 2], planes[1, row + 2, column + 2])
+    d = wp.vec2(planes[0, row + 2, column + 1], planes[1, row + 2, column + 1])
+    up = side + c - a
+    down = wp.vec2(side[0], -side[1]) + b - d
+    area = 0.5 * wp.abs(up[0] * down[1] - up[1] * down[0])
+    return area / wp.max(wp.max(wp.length(up), wp.length(down)), 1.0e-6)
+
+
 @functools.cache
 def make_deposit_patch(spec: Spec) -> wp.Function:
     """Deposit a cell as n x n pairs of triangles; return the flux that fell in the map.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import signal
@@ -15,6 +16,7 @@ import pytest
 
 import warp_caustics as wc
 from warp_caustics.cli import main
+from warp_caustics.cli.interrupt import Interrupt
 
 SCENE = """
 [water]
@@ -314,6 +316,25 @@ def test_an_interrupt_leaves_whole_files_only(scene, folder):
     for name in written:
         assert re.fullmatch(r"out\.\d{6}\.exr", name)
         assert wc.load_map(folder / name).shape == (16, 16)
+
+
+def test_an_interrupt_while_a_file_is_written_waits_for_its_end():
+    interrupt = Interrupt()
+    before = signal.getsignal(signal.SIGINT)
+    done = []
+    with pytest.raises(KeyboardInterrupt), interrupt.watch():
+        with interrupt.hold():
+            signal.raise_signal(signal.SIGINT)
+            done.append("written")
+        done.append("went on")
+    assert done == ["written"]
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_an_interrupt_that_native_code_drops_is_raised_again():
+    interrupt = Interrupt()
+    with pytest.raises(KeyboardInterrupt), interrupt.watch(), contextlib.suppress(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")

@@ -54,7 +54,7 @@ WATER_OPACITY = 0.2
 WATER_SHINE: dict[str, Any] = {"ambient": 0.3, "diffuse": 0.7, "specular": 0.8, "specular_power": 40.0}
 BORDER_ONLY = {"boundary_edges": True, "feature_edges": False, "manifold_edges": False, "non_manifold_edges": False}
 # Share of its light that the receiver shows whatever its slope; the rest is shaded, so that its relief can be seen.
-RELIEF_AMBIENT = 0.7
+RELIEF_AMBIENT = 0.5
 CAMERA_DIRECTION = (-0.35, -1.0, 0.85)  # from the scene to the camera, which stands before it and above it
 CAMERA_FOV = 30.0  # degrees
 CAMERA_MARGIN = 1.08  # leaves room for the labels
@@ -205,7 +205,8 @@ def _far_corner(window: Map) -> tuple[float, float]:
 def _polydata(mesh: TriangleMesh) -> pv.PolyData:
     import pyvista as pv
 
-    return pv.PolyData.from_regular_faces(mesh.vertices, mesh.triangles)
+    faces: Any = mesh.triangles  # any integers do, though the annotation there asks for Python's own
+    return pv.PolyData.from_regular_faces(mesh.vertices, faces)
 
 
 def _clip(mesh: pv.PolyData, window: Map) -> pv.PolyData:

@@ -168,8 +168,8 @@ _LIST = [
         count=3, longest=50.0, shortest=25.0, depth=32.0, sun=80.0,
     ),
     _case(
-        "leaving", "refracted light that meets the surface again: slopes to 0.8, sun 80° from the zenith", "hard",
-        rms_slope=0.566, count=1, longest=40.0, turn=0.5, depth=24.0, sun=80.0,
+        "leaving", "refracted light that meets the surface again: slope 1.6, sun 70° from the zenith", "hard",
+        rms_slope=1.13, count=1, longest=48.0, turn=0.6, depth=24.0, sun=70.0,
     ),
     _case(
         "shore", "a beach that comes out of the water", "hard", rms_slope=0.05, depth=10.0, sun=40.0,

@@ -13,7 +13,7 @@ MARCH_SHARE = 1e-3  # least step of the march, in shortest waves: what it may st
 MARCH_LIMIT = 20000  # steps after which a ray is said to miss; the least steps alone span 20 waves
 ROOT_STEPS = 80  # bisection alone reaches float64 in 60
 ROOT_SHARE = 1e-14  # width of a closed bracket, relative to the path
-CROSS_STEPS = 24  # samples in a shortest wave of a crossing test, whose least gap a parabola refines
+CROSS_STEPS = 24  # samples in a shortest wave of a crossing test, whose least gaps are refined by parabolas
 
 
 TINY = 1e-300  # keeps a bracket open where a ray starts on the floor
@@ -109,23 +109,30 @@ def crosses(
     """
     crossed = np.zeros(x.shape, dtype=np.bool_)
     edge = water.base + side * water.swing
-    with np.errstate(divide="ignore"):
-        clear = np.where(side * rz > 0.0, (edge - z) / rz, np.inf)  # from here on it is past every crest, or trough
-        step = water.shortest_wave / CROSS_STEPS / np.hypot(rx, ry)
-    end = np.minimum(end, clear)
-    live = np.flatnonzero(np.isfinite(step) & (end > 0.0))
+    across = np.hypot(rx, ry)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = water.shortest_wave / CROSS_STEPS / across
+        # past every crest, or trough, nothing is met; one step more, so that the last dip has both its sides
+        clear = np.where(side * rz > 0.0, (edge - z) / rz, np.inf) + step
+        end = np.minimum(end, clear)
+        count = np.ceil(end / step)
+        step = end / count  # even steps, as the parabola wants
+    live = np.flatnonzero((across > 0.0) & (count >= 1.0))
     before, last = np.zeros(live.size), np.zeros(live.size)
     i = 0
     while live.size:
         i += 1
-        t = np.minimum(i * step[live], end[live])
+        t = i * step[live]
         gap = side * (z[live] + t * rz[live] - water.height(x[live] + t * rx[live], y[live] + t * ry[live]))
         crossed[live[gap < 0.0]] = True
         if i > 1:
             bend = before - 2.0 * last + gap
-            dip = (before >= last) & (last <= gap) & (bend > 0.0)
-            least = last - (gap - before) ** 2 / (8.0 * np.where(dip, bend, 1.0))
-            crossed[live[dip & (least < 0.0)]] = True
-        on = ~crossed[live] & (t < end[live])
+            dip = np.flatnonzero((before >= last) & (last <= gap) & (gap >= 0.0) & (bend > 0.0))
+            j = live[dip]
+            least = t[dip] - step[j] * (1.0 + (gap - before)[dip] / (2.0 * bend[dip]))
+            h, hx, hy = water.height_and_slopes(x[j] + least * rx[j], y[j] + least * ry[j])
+            slide = (rz[j] - hx * rx[j] - hy * ry[j]) * step[j]  # what slope is left there says how far the dip goes on
+            crossed[j] |= side * (z[j] + least * rz[j] - h) - slide**2 / (2.0 * bend[dip]) < 0.0
+        on = ~crossed[live] & (i < count[live])
         before, last, live = last[on], gap[on], live[on]
     return crossed

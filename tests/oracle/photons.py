@@ -14,6 +14,8 @@ from oracle.setting import read_setting
 from oracle.surfaces import Array
 from oracle.window import emitting_window
 
+CHUNK = 100_000  # photons traced at a time
+
 
 @dataclass(frozen=True)
 class PhotonEstimate:
@@ -46,11 +48,13 @@ def photon_map(
     cells = np.ceil((window[:, 1] - window[:, 0]) / pixel * per_pixel).astype(int)
     width, height = pixel / per_pixel
     columns, rows = setting.resolution
+    block = max(1, CHUNK // cells[0])
     maps = np.zeros((batches, setting.channels, rows, columns))
     for image in maps:
-        for row in range(cells[1]):
-            u = window[0, 0] + width * (np.arange(cells[0]) + rng.random(cells[0]))
-            v = window[1, 0] + height * (row + rng.random(cells[0]))
+        for bottom in range(0, cells[1], block):
+            shape = (min(block, cells[1] - bottom), cells[0])
+            u = window[0, 0] + width * (np.arange(shape[1]) + rng.random(shape)).ravel()
+            v = window[1, 0] + height * (bottom + np.arange(shape[0])[:, None] + rng.random(shape)).ravel()
             rays = trace_points(setting, u, v)
             lands = rays.fate == LANDS
             deposit_points(image, rays.x[lands], rays.y[lands], rays.carried[:, lands] * width * height)

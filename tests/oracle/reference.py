@@ -86,7 +86,7 @@ def ideal_map(
     return triangle_map(read_setting(scene, time), per_pixel, 0, falling)
 
 
-def triangle_map(setting: Setting, oversample: float, splits: int = SPLITS, falling: bool = False) -> Reference:
+def triangle_map(setting: Setting, oversample: int, splits: int = SPLITS, falling: bool = False) -> Reference:
     """Lay down one lattice of cells, whose corners land on pixel corners when the water is at rest."""
     u, v = (_edges(setting, axis, oversample) for axis in (0, 1))
     deposit = Deposit(setting, splits, falling)
@@ -103,14 +103,14 @@ def triangle_map(setting: Setting, oversample: float, splits: int = SPLITS, fall
     return Reference(image, energy, float("nan"))
 
 
-def _edges(setting: Setting, axis: int, oversample: float) -> Array:
+def _edges(setting: Setting, axis: int, oversample: int) -> Array:
     """Give the lattice lines along one axis over the emitting window."""
     low, high = emitting_window(setting)[axis]
-    step = setting.pixel[axis] / oversample
+    pixel = setting.pixel[axis]
     anchor = setting.origin[axis] - setting.rest_deflection[axis] * setting.rest_depth
-    first = np.floor((low - anchor) / step)
-    last = np.ceil((high - anchor) / step)
-    return np.asarray(anchor + step * np.arange(first, last + 1.0))
+    first = int(np.floor((low - anchor) / pixel))  # whole pixels, so that every level lays down the same water
+    last = int(np.ceil((high - anchor) / pixel))
+    return np.asarray(anchor + pixel / oversample * np.arange(first * oversample, last * oversample + 1))
 
 
 def direct_sunlight(setting: Setting) -> Array:

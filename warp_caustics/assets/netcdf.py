@@ -25,13 +25,13 @@ def read_netcdf(path: Path, key: str | None) -> Stored:
     """Read a variable of two dimensions; missing values become NaN."""
     try:
         import xarray
-    except ImportError:
-        raise InputError('reading NetCDF needs xarray: pip install "warp-caustics[netcdf]"') from None
-    try:
+
         with xarray.open_dataset(path, decode_times=False) as dataset:
             flat = [str(name) for name, each in dataset.data_vars.items() if each.squeeze().ndim == 2]
             named = [str(name) for name in dataset.data_vars] if key is not None else flat
             variable = dataset[chosen(key, named, "variable")].squeeze().load()
+    except ImportError:  # of xarray, or of the library beneath it that knows the format
+        raise InputError('reading NetCDF needs xarray and netCDF4: pip install "warp-caustics[netcdf]"') from None
     except InputError:
         raise
     except (ValueError, OSError, RuntimeError, KeyError, MemoryError) as error:

@@ -11,6 +11,7 @@ from cyclopts.types import PositiveFloat, PositiveInt
 
 from warp_caustics import __version__
 from warp_caustics.cli import report
+from warp_caustics.cli.interrupt import Interrupt
 from warp_caustics.cli.quiet import start_warp
 from warp_caustics.errors import InputError
 
@@ -93,14 +94,17 @@ def render(
     start_warp()
     from warp_caustics.renderer import Renderer
 
-    renderer = Renderer(loaded, method=method, device=device, threads=threads)
+    interrupt = Interrupt()
     milliseconds = []
-    for index in report.progress(frames or 1):
-        renderer.render(time + index / fps)
-        result = renderer.result()
-        for path in paths(index):
-            result.save(path)
-        milliseconds.append(1e3 * result.seconds)
+    with interrupt.watch():
+        renderer = Renderer(loaded, method=method, device=device, threads=threads)
+        for index in report.progress(frames or 1):
+            renderer.render(time + index / fps)
+            result = renderer.result()
+            for path in paths(index):
+                with interrupt.hold():
+                    result.save(path)
+            milliseconds.append(1e3 * result.seconds)
     report.print_result(
         result, files=outputs, frames=frames, milliseconds=milliseconds, compile_seconds=renderer.compile_seconds
     )

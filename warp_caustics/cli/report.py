@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # These stand beside the sum of the ledger, not in it.
 BESIDE = ("dry", "over_lit")
 CHANNELS = ("red", "green", "blue")
+FEW_MILLISECONDS = 10.0  # below, decimals tell
 # A pipe has no width of its own: wide enough that no path is folded there.
 PIPE_WIDTH = 4096
 # Packages that decide what works here.
@@ -81,7 +82,8 @@ def print_result(
     table.add_row("method", result.method)
     table.add_row("device", escape(result.device))
     mean = sum(milliseconds) / len(milliseconds)
-    table.add_row("time", f"{mean:.3g} ms per frame, and {compile_seconds:.2f} s for kernels before the first")
+    decimals = 1 if mean >= FEW_MILLISECONDS else 3
+    table.add_row("time", f"{mean:,.{decimals}f} ms per frame, and {compile_seconds:.2f} s for kernels before")
     table.add_row("memory", f"{result.plan.bytes:,} bytes ({_mebibytes(result.plan.bytes)})")
     out = console()
     out.print(table)

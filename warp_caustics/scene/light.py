@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,7 +45,8 @@ class Sun(Model):
     """The sun: its direction one of two ways, its irradiance and its size."""
 
     direction: Annotated[Triple, AfterValidator(_downward_unit)] = Field(
-        default=None,  # never stays: `rules` asks for one of the two ways, and `_place` turns the other into this one
+        # None never stays: `rules` wants one of the two ways, and `_place` makes this one of the other.
+        default=cast("Any", None),
         description="the way light travels; brought to length 1. Either this, or elevation and azimuth",
     )
     elevation: Elevation | None = Field(default=None, description="height of the sun above the horizon [degrees]")
