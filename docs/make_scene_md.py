@@ -57,9 +57,10 @@ def _models(model: type[Model], path: str = "") -> Iterator[tuple[str, type[Mode
 
 def _inner(annotation: Any) -> Iterator[type[Model]]:
     """Yield the models inside a type."""
-    if isinstance(annotation, type) and issubclass(annotation, Model):
+    arguments = get_args(annotation)
+    if not arguments and isinstance(annotation, type) and issubclass(annotation, Model):
         yield annotation
-    for argument in get_args(annotation):
+    for argument in arguments:
         yield from _inner(argument)
 
 

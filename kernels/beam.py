@@ -29,7 +29,7 @@ BEND_LEAST, BEND_MOST = 0.0005, 0.005
 FINEST = 16
 """Parts of a cell along each side at most."""
 
-TORN_BEND = 1.0
+TORN_BEND = 0.25
 """Bend [pixels] past which a cell over a receiver with edges is followed ray by ray instead of interpolated."""
 
 
@@ -125,6 +125,7 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
         high = at_rest(lattice, index, 1.0)
         base = pixel_base(low)
         cubic = int(wp.static(int(refine)))
+        whole = int(1)
         if wp.static(bounded):
             # A cell that the water's border cuts keeps what is left of it, without the neighbours' cubic.
             before = to_rest(lattice, on_water(lattice, at_rest(lattice, index, -1.0), shift), shift)
@@ -134,6 +135,7 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
             uncut = 2.99 * lattice.step
             if after[0] - before[0] < uncut or after[1] - before[1] < uncut:
                 cubic = int(0)
+                whole = int(0)
             if high[0] <= low[0] or high[1] <= low[1]:
                 torn_cells_out[row, column] = wp.uint8(0)
                 return
@@ -141,15 +143,19 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
         if wp.static(breaks):
             common = common_state(state, row, column, 1, 2)
             if common_state(state, row, column, 0, 4) == 0:
+                # No interpolant reaches across an edge: beside one, a cell is followed ray by ray like those on it.
                 cubic = int(0)
+                if common == LANDED or common == LANDED_ON_OBJECT:
+                    common = int(0)
         n = int(1)
-        if wp.static(refine):
+        if wp.static(refine or edges):
             bend = float(0.0)
-            if cubic == 1:
+            if whole == 1 and common != 0:
                 bend = wp.max(plane_bend(planes, 0, row, column), plane_bend(planes, 1, row, column))
-            thick = thickness(planes, row, column, high - low)
-            left = wp.clamp(wp.static(BEND_SHARE) * thick, wp.static(BEND_LEAST), wp.static(BEND_MOST))
-            n = wp.clamp(int(wp.ceil(wp.sqrt(bend / left))), 1, wp.static(FINEST))
+            if wp.static(refine):
+                thick = thickness(planes, row, column, high - low)
+                left = wp.clamp(wp.static(BEND_SHARE) * thick, wp.static(BEND_LEAST), wp.static(BEND_MOST))
+                n = wp.clamp(int(wp.ceil(wp.sqrt(bend / left))), 1, wp.static(FINEST))
             if wp.static(edges):
                 if bend > wp.static(TORN_BEND):
                     common = int(0)

@@ -21,7 +21,10 @@ from .surface import HEIGHT_SLOPE_AND_CURVATURE
 from .waves import vec6
 
 PARTS = 4
-"""Parts of a torn cell along each side: its edges, a few pixels in a hundred, are right to 1/16 of a cell."""
+"""Parts of a torn cell along each side: edges of shadow and shore pass through a part by their share of it."""
+
+PARTS_WITH_EXITS = 8
+"""The same where light may leave through the surface again: that edge falls between parts, or not at all."""
 
 WIDEST = 8.0
 """Widest footprint of a part, in cells: past it the tangent plane is nearly along the ray, and a point serves."""
@@ -54,6 +57,7 @@ def make_torn(spec: Spec) -> wp.Kernel:
     dtype = ACCUMULATOR[spec.accumulate]
     flux_type = FLUX[spec.channels]
     channels, self_shadow = spec.channels, spec.self_shadow
+    parts = PARTS_WITH_EXITS if spec.exits else PARTS
 
     @wp.func
     def deposit_part(
@@ -140,9 +144,9 @@ def make_torn(spec: Spec) -> wp.Kernel:
         high = at_rest(lattice, index, 1.0)
         low = to_rest(lattice, on_water(lattice, low, light.rest_shift), light.rest_shift)
         high = to_rest(lattice, on_water(lattice, high, light.rest_shift), light.rest_shift)
-        side = (high - low) / float(wp.static(PARTS))
-        for j in range(wp.static(PARTS)):
-            for i in range(wp.static(PARTS)):
+        side = (high - low) / float(wp.static(parts))
+        for j in range(wp.static(parts)):
+            for i in range(wp.static(parts)):
                 corner = wp.vec2(low[0] + side[0] * float(i), low[1] + side[1] * float(j))
                 deposit_part(scene, light, lattice, corner, corner + side, map_out, ledger_out, row * 31 + column)
 

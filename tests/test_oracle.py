@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import oracle
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+
+import oracle
 from oracle.meet import crosses, meet_floor
 from oracle.rays import LEFT, trace_lattice, trace_points
+from oracle.window import emitting_window
 
 ROUNDING = 1e-12  # float64 sums of some 1e5 terms
 CLOSED_FORM = 1e-4  # what a converged map owes to a closed form
@@ -185,7 +187,10 @@ def test_one_sine_against_its_branches(slope, depth, light_x, ior):
     k, phase, columns = 2.0 * np.pi / 0.5, 0.4, 40
     wave = {"amplitude": slope / k, "wavevector": (k, 0.0), "phase": phase}
     scene = flat_scene(
-        (light_x, 0.0, -np.sqrt(1.0 - light_x**2)), medium={"ior": ior}, level=depth, waves=[wave],
+        (light_x, 0.0, -np.sqrt(1.0 - light_x**2)),
+        medium={"ior": ior},
+        level=depth,
+        waves=[wave],
         resolution=(columns, 2),
     )
     edges = 0.3 + np.linspace(0.0, 1.5, columns + 1)
@@ -247,10 +252,9 @@ def test_light_that_leaves_again():
 
 def test_crossing_sees_a_crest_that_a_ray_just_meets():
     surface = oracle.Surface(0.0, (0.0, 0.0), np.array([0.1]), np.array([[2.0 * np.pi, 0.0]]), np.zeros(1))
-    one = np.ones(2)
-    start = np.array([-0.6, -0.6])
-    height = np.array([0.1 - 1e-5, 0.1 + 1e-5])  # just under and just over the crest at x = 0.25
-    assert crosses(surface, start, 0 * one, height, one, 0 * one, 0 * one, one, 1.0).tolist() == [True, False]
+    height = [0.1 - 1e-6, 0.1 + 1e-6]  # just under and just over the crest at x = 0.25
+    start, ray = np.array([[-0.6, -0.6], [0.0, 0.0], height]), np.array([[1.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
+    assert crosses(surface, start, ray, np.ones(2), 1.0).tolist() == [True, False]
 
 
 def test_first_meeting_with_hills():
@@ -258,15 +262,28 @@ def test_first_meeting_with_hills():
     setting = oracle.read_setting(oracle.CASES["hills"].scene_dict())
     rng = np.random.default_rng(4)
     x, y = rng.uniform(0.0, 1.0, (2, 300))
-    z = np.full(300, setting.water.base)
+    start = np.stack([x, y, np.full(300, setting.water.base)])
     angle = rng.uniform(0.0, 2.0 * np.pi, 300)
     ray = np.stack([0.7 * np.cos(angle), 0.7 * np.sin(angle), np.full(300, -np.sqrt(0.51))])
-    length, hit = meet_floor(setting.floor, x, y, z, *ray)
+    length, hit = meet_floor(setting.floor, start, ray)
     assert hit.all()
     at = length * np.linspace(0.0, 1.0, 2001)[:, None]
-    over = z + at * ray[2] - setting.floor.height(x + at * ray[0], y + at * ray[1])
+    over = start[2] + at * ray[2] - setting.floor.height(x + at * ray[0], y + at * ray[1])
     assert np.abs(over[-1]).max() < 1e-12
     assert over[:-1].min() > -1e-6  # a march step may graze a hill by that much
+
+
+def test_window_holds_all_water_that_can_light_the_map():
+    """One wave that reaches its slope bound: the window is wide enough, and not much wider."""
+    k = 2.0 * np.pi / 0.01
+    wave = {"amplitude": 0.3 / k, "wavevector": (k, 0.0)}
+    setting = oracle.read_setting(flat_scene((0.5, 0.2, -1.0), waves=[wave]))
+    (low, high), _ = emitting_window(setting)
+    x = np.linspace(low - 0.5, high + 0.5, 20_001)
+    rays = trace_points(setting, x, np.full(x.shape, 0.1))
+    lights = x[(rays.x >= 0.0) & (rays.x <= 12.0)]
+    assert low < lights.min() < low + 0.02
+    assert high - 0.02 < lights.max() < high
 
 
 # --- the whole ------------------------------------------------------------------------------------------------------

@@ -37,8 +37,7 @@ PROBE = (
 )
 NO_DRAWING = (
     "VTK cannot draw on this machine (the attempt {how}); it needs libEGL with a driver, and libX11. "
-    "Debian and Ubuntu: apt-get install libegl1 libgl1 libxrender1. "
-    "Fedora: dnf install mesa-libEGL mesa-dri-drivers libXrender"
+    "Debian and Ubuntu: apt-get install libegl1 libgl1 libxrender1"
 )
 NO_DISPLAY = "no display to open a window on (DISPLAY is not set): write a picture with --screenshot FILE.png instead"
 

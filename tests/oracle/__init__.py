@@ -7,6 +7,7 @@ library's scene as a plain dictionary, so that one description drives both.
 from __future__ import annotations
 
 from oracle.cases import CASES, Case
+from oracle.clip import deposit_points, deposit_triangles
 from oracle.closed_forms import (
     first_focus_depth,
     flat_water_irradiance,
@@ -15,7 +16,6 @@ from oracle.closed_forms import (
     sine_irradiance,
     sine_landing,
 )
-from oracle.clip import deposit_points, deposit_triangles
 from oracle.optics import path_transmittance, refract, transmittance
 from oracle.photons import PhotonEstimate, photon_map
 from oracle.reference import Reference, ideal_map, reference_map, relative_l2, triangle_map

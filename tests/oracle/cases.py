@@ -1,4 +1,4 @@
-"""Named scenes on which accuracy is measured. Lengths are given in pixels, so that one sample a pixel means something."""
+"""Named scenes on which accuracy is measured, with lengths in pixels, so that one sample a pixel means something."""
 
 from __future__ import annotations
 
@@ -132,10 +132,14 @@ _LIST = [
     _case("choppy_45", "waves past their focus, sun at 45°", rms_slope=0.10, shortest=18.0, sun=45.0),
     _case("zenith", "sun at the zenith, waves at a later time", rms_slope=0.06, sun=0.0, time=0.7),
     _case("sun_60", "sun 60° from the zenith", rms_slope=0.06, shortest=16.0, sun=60.0),
-    _case("sun_80_calm", "sun 80° from the zenith over water too calm to shade itself", rms_slope=0.03, shortest=16.0, sun=80.0),
     _case(
-        "steep", "slopes to 0.8", rms_slope=0.33, count=3, longest=60.0, shortest=30.0, depth=24.0, sun=30.0
+        "sun_80_calm",
+        "sun 80° from the zenith over water too calm to shade itself",
+        rms_slope=0.03,
+        shortest=16.0,
+        sun=80.0,
     ),
+    _case("steep", "slopes to 0.8", rms_slope=0.33, count=3, longest=60.0, shortest=30.0, depth=24.0, sun=30.0),
     _case(
         "slope_terrain",
         "a sloping floor",
@@ -153,30 +157,60 @@ _LIST = [
         medium={"ior": 1.34, "absorption": (0.35, 0.07, 0.02), "fresnel": True},
     ),
     _case("millimetre", "a map 6.4 mm wide", pixel=1e-4, rms_slope=0.07),
-    _case("kilometre", "a map 2.56 km wide, far from the world's origin", pixel=40.0, rms_slope=0.05, origin=(1e5, -3e5)),
+    _case("kilometre", "a map 2.56 km wide far from the origin", pixel=40.0, rms_slope=0.05, origin=(1e5, -3e5)),
     _case("ior_1_3", "the least index of a liquid", rms_slope=0.07, medium={"ior": 1.3}),
     _case("ior_1_5", "the index of glass", rms_slope=0.07, medium={"ior": 1.5}),
     _case(
         "deep", "tens of crossing sheets", "deep", rms_slope=0.15, depth=256.0, count=10, shortest=15.0, longest=60.0
     ),
     _case(
-        "deep_45", "tens of crossing sheets, sun at 45°", "deep", rms_slope=0.12, depth=256.0, count=8, shortest=16.0,
-        sun=45.0
+        "deep_45",
+        "tens of crossing sheets, sun at 45°",
+        "deep",
+        rms_slope=0.12,
+        depth=256.0,
+        count=8,
+        shortest=16.0,
+        sun=45.0,
     ),
     _case(
-        "shaded", "crests shade troughs: sun 80° from the zenith, slopes above tan 10°", "hard", rms_slope=0.2,
-        count=3, longest=50.0, shortest=25.0, depth=32.0, sun=80.0,
+        "shaded",
+        "crests shade troughs: sun 80° from the zenith, slopes above tan 10°",
+        "hard",
+        rms_slope=0.2,
+        count=3,
+        longest=50.0,
+        shortest=25.0,
+        depth=32.0,
+        sun=80.0,
     ),
     _case(
-        "leaving", "refracted light that meets the surface again: slope 1.6, sun 70° from the zenith", "hard",
-        rms_slope=1.13, count=1, longest=48.0, turn=0.6, depth=24.0, sun=70.0,
+        "leaving",
+        "refracted light that meets the surface again: slope 1.6, sun 70° from the zenith",
+        "hard",
+        rms_slope=1.13,
+        count=1,
+        longest=48.0,
+        turn=0.6,
+        depth=24.0,
+        sun=70.0,
     ),
     _case(
-        "shore", "a beach that comes out of the water", "hard", rms_slope=0.05, depth=10.0, sun=40.0,
+        "shore",
+        "a beach that comes out of the water",
+        "hard",
+        rms_slope=0.05,
+        depth=10.0,
+        sun=40.0,
         receiver={"terrain": {"base": -0.1, "slope": (0.5, 0.15)}},
     ),
     _case(
-        "hills", "hills steep enough to hide what lies behind them", "hard", rms_slope=0.05, depth=64.0, sun=60.0,
+        "hills",
+        "hills steep enough to hide what lies behind them",
+        "hard",
+        rms_slope=0.05,
+        depth=64.0,
+        sun=60.0,
         receiver={"terrain": {"base": 0.0, "waves": _terrain_waves(PIXEL, (40.0,), 2.5)}},
     ),
 ]

@@ -17,7 +17,7 @@ Parts = tuple[Array, Array, Array, Index]  # x [3, n], y [3, n], share [n], owne
 
 
 def deposit_points(image: Array, x: Array, y: Array, flux: Array) -> Array:
-    """Add point fluxes [channels, n] at pixel coordinates to image [channels, rows, columns]; gives the flux outside."""
+    """Add point fluxes [channels, n] at pixel coordinates to an image, as below; gives the flux outside."""
     channels, rows, columns = image.shape
     inside = (x >= 0.0) & (x < columns) & (y >= 0.0) & (y < rows)
     pixel = np.floor(y[inside]).astype(np.int64) * columns + np.floor(x[inside]).astype(np.int64)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from oracle.surfaces import Array
@@ -106,7 +108,7 @@ def sine_irradiance(
     ends = np.concatenate([[low], sine_folds(amplitude, wavenumber, depth, ior, low, high, light_x, phase), [high]])
     light_z = -np.sqrt(1.0 - light_x**2)
     flux = np.zeros(edges.size - 1)
-    for start, stop in zip(ends[:-1], ends[1:], strict=True):
+    for start, stop in pairwise(ends):
         x = _preimages(edges, start, stop, args)
         height = amplitude * np.sin(wavenumber * x + phase)
         flux += np.abs(np.diff(height * light_x - x * light_z))

@@ -14,47 +14,45 @@ MARCH_LIMIT = 20000  # steps after which a ray is said to miss; the least steps 
 ROOT_STEPS = 80  # bisection alone reaches float64 in 60
 ROOT_SHARE = 1e-14  # width of a closed bracket, relative to the path
 CROSS_STEPS = 24  # samples in a shortest wave of a crossing test, whose least gaps are refined by parabolas
-
-
+SURE = 0.05  # least rate of fall, relative to the ray's own, at which its bound on the path is worth bisecting
+BEYOND = 1.001  # a bracket ends this much past its bound, which rounding must not cut short
 TINY = 1e-300  # keeps a bracket open where a ray starts on the floor
 
 
-def meet_floor(
-    floor: Surface, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array
-) -> tuple[Array, Flags]:
+def meet_floor(floor: Surface, start: Array, ray: Array) -> tuple[Array, Flags]:
     """Give the path length to the first meeting with the floor from points on or above it, and whether there is one.
 
-    All arrays are [n]. A plane is solved in closed form. Elsewhere the ray marches by its height over the floor divided
-    by the fastest rate at which that can shrink, so that no meeting is stepped over, then a bracketed Newton closes in.
+    ``start`` and unit ``ray`` are [3, n]. A plane is solved in closed form. Elsewhere the ray marches by its height
+    over the floor divided by the fastest rate at which that can shrink, so that no meeting is stepped over, and a
+    bracketed Newton closes in.
     """
-    side = np.hypot(rx, ry)
+    (x, y, z), (rx, ry, rz) = start, ray
     gap = z - floor.height(x, y)
     if floor.amplitude.size == 0:
         fall = -(rz - floor.slope[0] * rx - floor.slope[1] * ry)
         hit = fall > 0.0
         return np.where(hit, gap / np.where(hit, fall, 1.0), 0.0), hit
-    slowest = -rz - floor.slope_bound * side
+    slowest = -rz - floor.slope_bound * np.hypot(rx, ry)
     length, hit = np.zeros(x.shape), np.ones(x.shape, dtype=np.bool_)
     low, high = np.zeros(x.shape), np.zeros(x.shape)
-    sure = slowest > 0.05 * -rz  # the gap shrinks all the way: one meeting, and a bound on how far
-    high[sure] = 1.001 * np.maximum(gap[sure], 0.0) / slowest[sure] + TINY
+    sure = slowest > SURE * -rz  # the gap shrinks all the way: one meeting, and a bound on how far
+    high[sure] = BEYOND * np.maximum(gap[sure], 0.0) / slowest[sure] + TINY
     todo = np.flatnonzero(~sure)
     if todo.size:
-        low[todo], high[todo], hit[todo] = _march(floor, *(a[todo] for a in (x, y, z, rx, ry, rz)))
+        low[todo], high[todo], hit[todo] = _march(floor, start[:, todo], ray[:, todo])
     go = np.flatnonzero(hit)
-    length[go] = _close_in(floor, *(a[go] for a in (x, y, z, rx, ry, rz)), low[go], high[go])
+    length[go] = _close_in(floor, start[:, go], ray[:, go], low[go], high[go])
     return length, hit
 
 
-def _march(
-    floor: Surface, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array
-) -> tuple[Array, Array, Flags]:
+def _march(floor: Surface, start: Array, ray: Array) -> tuple[Array, Array, Flags]:
     """Bracket the first change of sign of the height over the floor along each ray."""
+    (x, y, z), (rx, ry, rz) = start, ray
     fastest = -rz + floor.slope_bound * np.hypot(rx, ry)
     least = MARCH_SHARE * floor.shortest_wave
     fall = -(rz - floor.slope[0] * rx - floor.slope[1] * ry)
     above = z - floor.plane(x, y) - floor.swing
-    t = np.where(fall > 0.0, np.maximum(above, 0.0) / np.where(fall > 0.0, fall, 1.0), 0.0)  # over every hill until here
+    t = np.maximum(above, 0.0) / np.where(fall > 0.0, fall, np.inf)  # over every hill until here
     low, high, hit = np.zeros(x.shape), np.zeros(x.shape), np.zeros(x.shape, dtype=np.bool_)
     live = np.arange(x.size)
     for _ in range(MARCH_LIMIT):
@@ -73,10 +71,9 @@ def _march(
     return low, high, hit
 
 
-def _close_in(
-    floor: Surface, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array, low: Array, high: Array
-) -> Array:
+def _close_in(floor: Surface, start: Array, ray: Array, low: Array, high: Array) -> Array:
     """Newton's method inside a bracket that shrinks; a step that would leave it is a bisection instead."""
+    (x, y, z), (rx, ry, rz) = start, ray
     low, high = low.copy(), high.copy()
     t = 0.5 * (low + high)
     live = np.arange(x.size)
@@ -100,13 +97,13 @@ def _close_in(
     return t
 
 
-def crosses(
-    water: Surface, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array, end: Array, side: float
-) -> Flags:
-    """Tell whether rays that start on the water cross it again before path length ``end``. All arrays [n].
+def crosses(water: Surface, start: Array, ray: Array, end: Array, side: float) -> Flags:
+    """Tell whether rays that start on the water cross it again before path length ``end``.
 
-    ``side`` is 1 for a ray that starts upward into the air, -1 for one that starts downward into the water.
+    ``start`` and unit ``ray`` are [3, n], ``end`` [n]. ``side`` is 1 for a ray that starts upward into the air, -1 for
+    one that starts downward into the water.
     """
+    (x, y, z), (rx, ry, rz) = start, ray
     crossed = np.zeros(x.shape, dtype=np.bool_)
     edge = water.base + side * water.swing
     across = np.hypot(rx, ry)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -29,10 +30,11 @@ class Rays:
     carried: Array  # what reaches the floor, or the surface again
     over_lit: Array  # the part of ``emitted`` that shadows would take away
 
-    def pick(self, index: tuple[object, ...]) -> Rays:
-        """Index the last axes of every array."""
+    def pick(self, index: Any) -> Rays:
+        """Index the last axes of every array by a tuple of as many."""
+        deep = (slice(None), *index)
         flat = (self.fate[index], self.x[index], self.y[index])
-        return Rays(*flat, *(getattr(self, name)[(..., *index)] for name in FLUXES))
+        return Rays(*flat, *(getattr(self, name)[deep] for name in FLUXES))
 
 
 FLUXES = ("emitted", "reflected", "absorbed", "carried", "over_lit")
@@ -58,7 +60,8 @@ def _trace(setting: Setting, x: Array, y: Array, z: Array, zx: Array, zy: Array)
     taken = np.maximum(facing, 0.0)
     fate = np.full(x.shape, LANDS, dtype=np.int8)
     fate[facing <= 0.0] = DARK
-    shaded = (facing > 0.0) & _shaded(setting, x, y, z, facing > 0.0)
+    start, ray = np.stack([x, y, z]), np.stack([rx, ry, rz])
+    shaded = _shaded(setting, start, facing > 0.0)
     if setting.shadows:
         fate[shaded] = SHADED
     dry = z < setting.floor.height(x, y)
@@ -66,10 +69,10 @@ def _trace(setting: Setting, x: Array, y: Array, z: Array, zx: Array, zy: Array)
     # the light is followed wherever there is water, lit or not: dark corners belong to cells that are partly lit
     length = np.zeros(x.shape)
     wet = np.flatnonzero(~dry)
-    length[wet], hit = meet_floor(setting.floor, *(a[wet] for a in (x, y, z, rx, ry, rz)))
+    length[wet], hit = meet_floor(setting.floor, start[:, wet], ray[:, wet])
     missed = np.zeros(x.shape, dtype=np.bool_)
     missed[wet] = ~hit
-    lost = _leaves(setting, x, y, z, rx, ry, rz, np.where(missed, np.inf, length), fate == LANDS)
+    lost = _leaves(setting, start, ray, np.where(missed, np.inf, length), fate == LANDS)
     fate[missed & (fate == LANDS)] = MISSED
     fate[lost] = LEFT
     return _account(setting, fate, x + length * rx, y + length * ry, length, taken, cosine, shaded, shape)
@@ -107,23 +110,18 @@ def _account(
     )
 
 
-def _shaded(setting: Setting, x: Array, y: Array, z: Array, candidates: Flags) -> Flags:
+def _shaded(setting: Setting, start: Array, candidates: Flags) -> Flags:
     """Tell which points lie in the shadow of a crest: the way back to the sun meets the water."""
-    shaded = np.zeros(x.shape, dtype=np.bool_)
-    if not setting.can_shade:
-        return shaded
-    i = np.flatnonzero(candidates)
-    back = (np.full(i.shape, -c) for c in setting.direction)
-    shaded[i] = crosses(setting.water, x[i], y[i], z[i], *back, np.full(i.shape, np.inf), 1.0)
+    shaded = np.zeros(candidates.shape, dtype=np.bool_)
+    i = np.flatnonzero(candidates) if setting.can_shade else np.zeros(0, dtype=np.int64)
+    back = np.repeat(-setting.direction[:, None], i.size, axis=1)
+    shaded[i] = crosses(setting.water, start[:, i], back, np.full(i.size, np.inf), 1.0)
     return shaded
 
 
-def _leaves(
-    setting: Setting, x: Array, y: Array, z: Array, rx: Array, ry: Array, rz: Array, end: Array, candidates: Flags
-) -> Flags:
+def _leaves(setting: Setting, start: Array, ray: Array, end: Array, candidates: Flags) -> Flags:
     """Tell which refracted light meets the surface from below before it lands; only rays flatter than it can."""
-    left = np.zeros(x.shape, dtype=np.bool_)
-    i = np.flatnonzero(candidates & (setting.water.slope_bound * np.hypot(rx, ry) >= -rz))
-    if i.size:
-        left[i] = crosses(setting.water, *(a[i] for a in (x, y, z, rx, ry, rz)), end[i], -1.0)
+    left = np.zeros(candidates.shape, dtype=np.bool_)
+    i = np.flatnonzero(candidates & (setting.water.slope_bound * np.hypot(ray[0], ray[1]) >= -ray[2]))
+    left[i] = crosses(setting.water, start[:, i], ray[:, i], end[i], -1.0)
     return left

@@ -70,15 +70,11 @@ def reference_map(
     error = float(np.sqrt(np.mean(step**2)) / np.mean(fine.caustic_map))
     if not extrapolate:
         return Reference(fine.caustic_map, fine.energy, error)
-    energy = {
-        name: value + (value - coarse.energy[name]) / (ORDER_FACTOR - 1.0) for name, value in fine.energy.items()
-    }
+    energy = {name: value + (value - coarse.energy[name]) / (ORDER_FACTOR - 1.0) for name, value in fine.energy.items()}
     return Reference(fine.caustic_map + step, energy, error)
 
 
-def ideal_map(
-    scene: Mapping[str, Any], time: float = 0.0, per_pixel: int = 1, falling: bool = False
-) -> Reference:
+def ideal_map(scene: Mapping[str, Any], time: float = 0.0, per_pixel: int = 1, falling: bool = False) -> Reference:
     """Lay down unrefined triangles: what a plain exact deposit reaches.
 
     ``per_pixel`` cells lie along a pixel's side; ``falling`` chooses the diagonal that cuts them, as in ``Deposit``.

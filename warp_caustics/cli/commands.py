@@ -97,7 +97,8 @@ def render(
     interrupt = Interrupt()
     milliseconds = []
     with interrupt.watch():
-        renderer = Renderer(loaded, method=method, device=device, threads=threads)
+        with report.working("building kernels"):
+            renderer = Renderer(loaded, method=method, device=device, threads=threads)
         for index in report.progress(frames or 1):
             renderer.render(time + index / fps)
             result = renderer.result()
@@ -184,7 +185,8 @@ def view(
     start_warp()
     from warp_caustics.renderer import render as render_once
 
-    result = render_once(loaded, method=method, device=device, time=time)
+    with report.working("building kernels and rendering"):
+        result = render_once(loaded, method=method, device=device, time=time)
     show(result, screenshot=screenshot)
     if screenshot is not None:
         report.print_files([screenshot])

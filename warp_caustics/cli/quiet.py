@@ -8,21 +8,22 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-NO_DRIVER = "Could not find or load the NVIDIA CUDA driver"
+# Lines that are no news to somebody who asked for a map: this machine has no GPU; a later Warp will not run here.
+HARMLESS = ("Could not find or load the NVIDIA CUDA driver", "Support for Python 3.10 is deprecated")
 
 
 def start_warp() -> None:
-    """Initialise Warp, silent unless it warns; that a machine has no CUDA driver is no warning here."""
-    import warp as wp
+    """Initialise Warp, silent unless it warns of something that matters here."""
+    with _without_lines(HARMLESS):
+        import warp as wp
 
-    wp.config.log_level = wp.LOG_WARNING
-    with _without_line(NO_DRIVER):
+        wp.config.log_level = wp.LOG_WARNING
         wp.init()
 
 
 @contextmanager
-def _without_line(phrase: str) -> Iterator[None]:
-    """Hold back what native code writes to the error stream, and pass on all lines but those with the phrase."""
+def _without_lines(phrases: tuple[str, ...]) -> Iterator[None]:
+    """Hold back what is written to the error stream, and pass on all lines but those with one of the phrases."""
     error_stream = 2  # native code writes to the descriptor itself, whatever `sys.stderr` is
     sys.stderr.flush()
     kept = os.dup(error_stream)
@@ -31,9 +32,10 @@ def _without_line(phrase: str) -> Iterator[None]:
         try:
             yield
         finally:
+            sys.stderr.flush()
             os.dup2(kept, error_stream)
             os.close(kept)
             held.seek(0)
             for line in held.read().decode(errors="replace").splitlines():
-                if phrase not in line:
+                if not any(phrase in line for phrase in phrases):
                     print(line, file=sys.stderr)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -43,6 +44,12 @@ def progress(count: int) -> Iterable[int]:
     if count == 1 or not bar.is_terminal:
         return range(count)
     return track(range(count), description="rendering", console=bar, transient=True)
+
+
+def working(what: str) -> AbstractContextManager[object]:
+    """Say what is being waited for while a block runs, where there is a terminal to show it."""
+    terminal = Console(stderr=True)
+    return terminal.status(what) if terminal.is_terminal else nullcontext()
 
 
 def print_files(paths: Sequence[Path]) -> None:
