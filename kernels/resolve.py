@@ -75,7 +75,7 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
         share = dry_share(scene, middle, wp.static(SURE) * pixel)
         if share <= 0.0:
             return
-        parts = wp.static(DRY_PARTS)
+        parts = int(wp.static(DRY_PARTS))  # a variable, so that the loops are not unrolled
         part = pixel / float(parts)
         light = float(0.0)
         for j in range(parts):

@@ -144,9 +144,10 @@ def make_torn(spec: Spec) -> wp.Kernel:
         high = at_rest(lattice, index, 1.0)
         low = to_rest(lattice, on_water(lattice, low, light.rest_shift), light.rest_shift)
         high = to_rest(lattice, on_water(lattice, high, light.rest_shift), light.rest_shift)
-        side = (high - low) / float(wp.static(parts))
-        for j in range(wp.static(parts)):
-            for i in range(wp.static(parts)):
+        count = int(wp.static(parts))  # a variable, so that the loops are not unrolled
+        side = (high - low) / float(count)
+        for j in range(count):
+            for i in range(count):
                 corner = wp.vec2(low[0] + side[0] * float(i), low[1] + side[1] * float(j))
                 deposit_part(scene, light, lattice, corner, corner + side, map_out, ledger_out, row * 31 + column)
 

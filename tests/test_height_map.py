@@ -8,19 +8,14 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from kernel_helpers import grid_surface, points, rounded
 
-from warp_caustics.assets import HeightGrid
-from warp_caustics.height_map import (
-    OVERSHOOT,
-    covers,
-    difference,
-    hermite_nodes,
-    node_slopes,
-    node_spacing,
-    sample_heights,
-)
+import warp_caustics as wc
+from warp_caustics.assets import Assets, HeightGrid
+from warp_caustics.height_map import covers, difference, hermite_nodes, node_spacing, sample_heights
 from warp_caustics.kernels.grid import grid_cell
 from warp_caustics.kernels.surface import Surface, grid_at, grid_curved_at
 from warp_caustics.kernels.waves import vec6
+from warp_caustics.receiver import receiver_bounds
+from warp_caustics.water import amplitude_bound, extreme_slopes
 
 wp.set_module_options({"enable_backward": False})
 
@@ -91,8 +86,8 @@ def test_differences_are_of_fourth_order_inside_and_at_both_ends(where):
     """Half the spacing, a sixteenth of the error, at the first two, the last two and all other nodes."""
     errors = []
     for n in (40, 80, 160):
-        x = np.linspace(0.3, 2.3, n + 1)
-        error = difference(np.sin(3.0 * x), 0) * n / 2.0 - 3.0 * np.cos(3.0 * x)
+        x = np.linspace(0.0, 2.0, n + 1)
+        error = difference(np.exp(x), 0) * n / 2.0 - np.exp(x)  # no derivative of it is zero anywhere
         errors.append(np.abs(error[where]).max())
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert np.abs(orders - 4.0).max() < ORDER_MARGIN
@@ -203,10 +198,10 @@ def test_an_index_is_bounded_whatever_the_position(device):
 
 def test_a_point_that_is_no_number_reads_no_other_memory(device):
     z = np.random.default_rng(1).random((5, 5))
-    at = np.array([[np.nan, 0.6], [-1.0, np.nan], [np.nan, np.nan], [np.inf, -np.inf], [-1.0, 0.7]])
+    at = np.array([[np.nan, 0.6], [-1.0, np.nan], [np.nan, np.nan], [np.inf, -np.inf], [1e9, -1e9]])
     sums, curved = evaluate(z, at, device)
     assert np.isfinite(sums[3:]).all() and np.isfinite(curved[3:]).all()
-    assert np.abs(sums[3, 0]) < 3.0
+    assert (sums[3] == sums[4]).all()
 
 
 @settings(deadline=None, max_examples=40)
@@ -240,20 +235,8 @@ def test_covers_tells_inside_from_outside():
     assert not covers(grid, (1.0, 2.0), (5.0, 5.1))
 
 
-def steepest_between(z, parts=8):
-    """Largest slope of the Hermite surface by node, looked for between the nodes, and its height range."""
-    grid = HeightGrid(z, (0.0, 0.0), (float(z.shape[1]), float(z.shape[0])))
-    x = 0.5 + np.linspace(0.0, z.shape[1] - 1.0, parts * (z.shape[1] - 1) + 1)
-    y = 0.5 + np.linspace(0.0, z.shape[0] - 1.0, parts * (z.shape[0] - 1) + 1)
-    x, y = np.meshgrid(x, y)
-    h = 1e-5
-    zx = (sample_heights(grid, x + h, y) - sample_heights(grid, x - h, y)) / (2.0 * h)
-    zy = (sample_heights(grid, x, y + h) - sample_heights(grid, x, y - h)) / (2.0 * h)
-    return grid, float(np.hypot(zx, zy).max()), sample_heights(grid, x, y)
-
-
 def rough(kind):
-    """Height maps that a bound by the slopes at the nodes may miss."""
+    """Nodes that a bound by what stands at the nodes may miss."""
     i, j = np.meshgrid(np.arange(16), np.arange(16))
     return {
         "smooth": np.sin(0.4 * i + 0.3 * j),
@@ -265,9 +248,60 @@ def rough(kind):
     }[kind]
 
 
-@pytest.mark.parametrize("kind", ["smooth", "four nodes a wave", "cliff", "two nodes a wave", "one pillar", "noise"])
-def test_the_slope_bound_of_a_height_map_is_not_passed_between_its_nodes(kind):
-    """A march steps by this bound, and the window of water that lights the map follows from it."""
-    grid, steepest, _ = steepest_between(rough(kind))
-    bound = OVERSHOOT * np.linalg.norm(node_slopes(grid), axis=1).max()
-    assert bound >= steepest
+def found_between(z, parts=8):
+    """Largest slope, lowest and highest point of the surface, looked for between its nodes and in its border."""
+    grid = HeightGrid(z, (0.0, 0.0), (float(z.shape[1]), float(z.shape[0])))
+    h = 1e-5
+    x = np.linspace(2.0 * h, grid.size[0] - 2.0 * h, parts * z.shape[1] + 1)
+    y = np.linspace(2.0 * h, grid.size[1] - 2.0 * h, parts * z.shape[0] + 1)
+    x, y = np.meshgrid(x, y)
+    zx = (sample_heights(grid, x + h, y) - sample_heights(grid, x - h, y)) / (2.0 * h)
+    zy = (sample_heights(grid, x, y + h) - sample_heights(grid, x, y - h)) / (2.0 * h)
+    height = sample_heights(grid, x, y)
+    return grid, float(np.hypot(zx, zy).max()), float(height.min()), float(height.max())
+
+
+def over_grid(grid):
+    """A scene whose water, or whose terrain, is a height map that is at hand already."""
+    file = {"file": "at-hand.npy", "origin": grid.origin, "size": grid.size}
+    common = {
+        "sun": {"direction": (0.2, 0.1, -1.0)},
+        "medium": {"ior": 1.333},
+        "map": {"origin": grid.origin, "size": grid.size, "resolution": (8, 8)},
+    }
+    water = wc.Scene(**common, water={"level": 9.0, "height_map": file}, receiver={"plane": 0.0})
+    terrain = wc.Scene(**common, water={"level": 9.0, "waves": []}, receiver={"terrain": file})
+    return water, terrain
+
+
+BUG = pytest.mark.xfail(
+    strict=True, reason="BUG: bounds of a height map are taken at its nodes and passed between"
+)
+ROUGH = ["four nodes a wave", "cliff", "two nodes a wave", "one pillar", "noise"]
+KINDS = ["smooth", *(pytest.param(kind, marks=BUG) for kind in ROUGH)]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_bounds_of_a_terrain_hold_between_its_nodes(kind):
+    """A march steps by the slope's bound, and gives up outside those of the height."""
+    grid, steepest, lowest, highest = found_between(rough(kind))
+    bounds = receiver_bounds(over_grid(grid)[1], Assets(None, grid, None, None), np.zeros(2), np.array(grid.size))
+    assert bounds.slope >= steepest
+    assert bounds.lowest <= lowest and bounds.highest >= highest
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_bounds_of_water_from_a_file_hold_between_its_nodes(kind):
+    """The window of water that lights the map follows from them."""
+    grid, steepest, lowest, highest = found_between(rough(kind))
+    water, assets = over_grid(grid)[0], Assets(grid, None, None, None)
+    assert np.linalg.norm(extreme_slopes(water, assets), axis=1).max() >= steepest
+    assert amplitude_bound(water, assets) >= max(-lowest, highest)
+
+
+def test_the_bounds_of_a_smooth_map_are_not_far_too_wide():
+    """A bound that is no use would pass the tests above: within a half of what is found."""
+    grid, steepest, lowest, highest = found_between(rough("smooth"))
+    bounds = receiver_bounds(over_grid(grid)[1], Assets(None, grid, None, None), np.zeros(2), np.array(grid.size))
+    assert bounds.slope < 1.5 * steepest
+    assert bounds.highest - bounds.lowest < 1.5 * (highest - lowest)

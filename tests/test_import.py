@@ -12,6 +12,11 @@ import pytest
 
 import warp_caustics as wc
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "warp_caustics"
 KERNELS = ROOT / "kernels"
@@ -111,6 +116,16 @@ def test_every_public_name_is_there_and_once():
     for name in wc.__all__:
         assert getattr(wc, name) is not None
     assert dir(wc) == sorted(wc.__all__)
+
+
+def test_the_wheel_holds_every_package_and_data_file():
+    """An editable install does not show what a wheel would lack."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
+    listed = set(settings["packages"])
+    assert listed == {_module(path) for path in FILES if path.name == "__init__.py"} | {"warp_caustics.kernels"}
+    patterns = settings["package-data"]["warp_caustics.scenes"]
+    for path in (PACKAGE / "scenes").iterdir():
+        assert path.suffix == ".py" or path.is_dir() or any(path.match(pattern) for pattern in patterns), path.name
 
 
 def test_an_unknown_name_is_an_attribute_error():

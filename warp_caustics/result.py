@@ -45,8 +45,8 @@ class Result:
         Where the light went [W].
     seconds : float
         Time of the frame, compilation apart.
-    screen_map, picture : None
-        What an eye sees: the methods of this version do not look.
+    picture : None
+        A deferred frame: not yet.
     """
 
     scene: Scene
@@ -58,7 +58,6 @@ class Result:
     energy: Energy
     seconds: float
     assets: Assets = field(repr=False)
-    screen_map: np.ndarray | None = None
     picture: np.ndarray | None = None
 
     @cached_property
@@ -71,6 +70,18 @@ class Result:
         if self.caustic_map.ndim == 3:
             scale = scale[..., None]
         return (self.caustic_map * scale).astype(np.float32)
+
+    @cached_property
+    def screen_map(self) -> np.ndarray | None:
+        """Irradiance on the surface that each pixel of the camera sees, ``[rows, columns]``; None without a camera.
+
+        Made when it is first asked for: a map alone compiles and launches nothing for an eye. See :mod:`.screen`.
+        """
+        if self.scene.camera is None:
+            return None
+        from .screen import look
+
+        return look(self.scene, self.assets, self.caustic_map, self.device)
 
     @property
     def warnings(self) -> list[str]:
