@@ -52,6 +52,11 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
     @wp.func
     def dry_share(scene: Scene, at: wp.vec2, size: wp.vec2) -> float:
         ground = terrain_at(scene.receiver.terrain, at[0], at[1])
+        spread = wp.abs(ground[1]) * size[0] + wp.abs(ground[2]) * size[1]
+        if ground[0] + spread < -scene.water.amplitude:
+            return 0.0
+        if ground[0] - spread > scene.water.amplitude:
+            return 1.0
         water = water_at(scene.water.surface, at[0], at[1])
         return share_lit(ground[0] - water[0], wp.vec2(ground[1] - water[1], ground[2] - water[2]), size)
 

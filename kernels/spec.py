@@ -1,4 +1,4 @@
-"""What a scene makes the kernels do: a frozen value by which the factories of this folder build, and cache, their kernels."""
+"""What a scene makes the kernels do: a frozen value by which the factories of this folder build their kernels."""
 
 from dataclasses import dataclass
 

@@ -15,7 +15,7 @@ from .deposit import ACCUMULATOR, FLUX
 from .lattice import Lattice, at_rest, on_water, pixel_base, pixel_fraction, to_rest
 from .ledger import EMITTED, OVER_LIT, SHADED, make_book_landed, make_count_unlanded, tally
 from .optics import facing, refract_at_slope
-from .photon import LANDED, LANDED_ON_OBJECT, LOST, Photon, Scene, SunSample, make_land, make_lit, make_wet
+from .photon import LANDED, LANDED_ON_OBJECT, Photon, Scene, SunSample, make_land, make_lit, make_wet
 from .spec import Spec
 from .surface import HEIGHT_SLOPE_AND_CURVATURE
 from .waves import vec6
@@ -31,9 +31,7 @@ WIDEST = 8.0
 
 
 @wp.func
-def footprint_corner(
-    scene: Scene, sun: wp.vec3, photon: Photon, z: vec6, dx: float, dy: float
-) -> wp.vec2:
+def footprint_corner(scene: Scene, sun: wp.vec3, photon: Photon, z: vec6, dx: float, dy: float) -> wp.vec2:
     """Where the ray from (dx, dy) [m] beside a photon's origin cuts the receiver's tangent plane, from its landing."""
     slope = wp.vec2(z[1] + z[3] * dx + z[4] * dy, z[2] + z[4] * dx + z[5] * dy)
     direction = refract_at_slope(sun, slope, scene.medium.eta)

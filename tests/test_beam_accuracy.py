@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle import CASES, load_reference, relative_l2
 
 import warp_caustics as wc
+from oracle import CASES, load_reference, relative_l2
 
 # What the library promises of `beam` at its default settings, as RMSE over mean.
 ORDINARY = 5e-3

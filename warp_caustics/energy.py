@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+
 @dataclass(frozen=True)
 class Energy(Mapping[str, "float | np.ndarray"]):
     """Where the light of a frame went [W]: a number, or ``[3]`` for a scene in colour.

@@ -98,9 +98,12 @@ def write_map(
         "time": _as_attribute(time),
         **{ENERGY_PREFIX + name: _as_attribute(value) for name, value in energy.items()},
     }
-    # Python's own file object brings a full disk and Ctrl-C back as what they are; the binding's turns them into text.
-    with whole_file(path) as temporary, OpenEXR.File(header, channels) as exr, temporary.open("wb") as stream:
-        exr.write(stream)
+    # Into memory first: the binding swallows Ctrl-C, and a full disk becomes a text; Python's own file does neither.
+    encoded = io.BytesIO()
+    with OpenEXR.File(header, channels) as exr:
+        exr.write(encoded)
+    with whole_file(path) as temporary:
+        temporary.write_bytes(encoded.getbuffer())
 
 
 def load_map(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:

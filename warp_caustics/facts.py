@@ -120,7 +120,9 @@ def _ior(scene: Scene) -> tuple[float, list[str]]:
     if isinstance(ior, str):
         ior = IOR_TABLE[ior]
     if isinstance(ior, tuple):
-        return ior[GREEN], [f"medium.ior: given by channel without dispersion, so green's {ior[GREEN]:g} serves for all"]
+        return ior[GREEN], [
+            f"medium.ior: given by channel without dispersion, so green's {ior[GREEN]:g} serves for all"
+        ]
     return float(ior), []
 
 

@@ -111,6 +111,8 @@ def _target(path: str | os.PathLike[str]) -> Path:
     try:
         # The link's own target is replaced, not the link.
         target = target.resolve()
+        if target.is_symlink():  # Python 3.13 resolves a loop of links to itself, and says nothing
+            raise InputError(f"cannot write {shown!r}: it is a loop of symbolic links")
         mode = target.stat().st_mode if target.exists() else None
         folder_mode = target.parent.stat().st_mode if target.parent.exists() else None
     except (OSError, ValueError, RuntimeError) as error:  # too long a name, a null character, a loop of links

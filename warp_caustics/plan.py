@@ -112,7 +112,10 @@ class Plan:
 
 
 def make_plan(
-    scene: Scene | str | os.PathLike[str], method: str | None = None, device: str | None = None, threads: int | None = None
+    scene: Scene | str | os.PathLike[str],
+    method: str | None = None,
+    device: str | None = None,
+    threads: int | None = None,
 ) -> Plan:
     """Plan a scene: which passes and buffers it needs, and why the others are left out.
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from .errors import InputError
 from .height_map import OVERSHOOT, covers, node_slopes, sample_heights
+from .scene import ClosedTerrain
 
 if TYPE_CHECKING:
     from .assets import Assets
@@ -39,7 +40,14 @@ def receiver_kind(scene: Scene) -> str:
         return "plane"
     if scene.receiver.mesh is not None:
         return "mesh"
-    return "grid" if hasattr(scene.receiver.terrain, "file") else "waves"
+    return "waves" if isinstance(scene.receiver.terrain, ClosedTerrain) else "grid"
+
+
+def closed_terrain(scene: Scene) -> ClosedTerrain:
+    """The terrain of a scene whose receiver is one in closed form."""
+    terrain = scene.receiver.terrain
+    assert isinstance(terrain, ClosedTerrain)
+    return terrain
 
 
 def receiver_heights(scene: Scene, assets: Assets, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -59,7 +67,7 @@ def receiver_heights(scene: Scene, assets: Assets, x: np.ndarray, y: np.ndarray)
     if kind == "grid":
         assert assets.terrain is not None
         return sample_heights(assets.terrain, x, y)
-    terrain = scene.receiver.terrain
+    terrain = closed_terrain(scene)
     z = terrain.base + terrain.slope[0] * x + terrain.slope[1] * y
     for wave in terrain.waves:
         z = z + wave.amplitude * np.sin(wave.wavevector[0] * x + wave.wavevector[1] * y + wave.phase)
@@ -97,8 +105,10 @@ def receiver_bounds(scene: Scene, assets: Assets, low: np.ndarray, high: np.ndar
         steepest = OVERSHOOT * np.linalg.norm(node_slopes(assets.terrain), axis=1).max()
         spare = (OVERSHOOT - 1.0) * 0.5 * (z.max() - z.min())
         return Bounds(float(z.min() - spare), float(z.max() + spare), float(steepest))
-    terrain = scene.receiver.terrain
-    corners = [terrain.base + terrain.slope[0] * x + terrain.slope[1] * y for x in (low[0], high[0]) for y in (low[1], high[1])]
+    terrain = closed_terrain(scene)
+    corners = [
+        terrain.base + terrain.slope[0] * x + terrain.slope[1] * y for x in (low[0], high[0]) for y in (low[1], high[1])
+    ]
     swing = sum(abs(wave.amplitude) for wave in terrain.waves)
     steepest = np.hypot(*terrain.slope) + sum(abs(w.amplitude) * np.hypot(*w.wavevector) for w in terrain.waves)
     return Bounds(min(corners) - swing, max(corners) + swing, float(steepest))
@@ -108,8 +118,7 @@ def rest_depth(scene: Scene, assets: Assets) -> float:
     """Mean depth of the water at rest over the wet part of the map [m]: that of the dispersion relation."""
     origin, size = np.asarray(scene.map.origin), np.asarray(scene.map.size)
     if receiver_kind(scene) == "mesh":
-        depth = scene.water.level - receiver_bounds(scene, assets, origin, origin + size).lowest
-        return max(depth, SHALLOWEST)
+        return max(scene.water.level - receiver_bounds(scene, assets, origin, origin + size).lowest, SHALLOWEST)
     at = (np.arange(DEPTH_SAMPLES) + 0.5) / DEPTH_SAMPLES
     z = receiver_heights(scene, assets, origin[0] + at[None, :] * size[0], origin[1] + at[:, None] * size[1])
     depth = scene.water.level - z

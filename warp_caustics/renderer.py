@@ -16,7 +16,6 @@ from .kernels.deposit import ACCUMULATOR, FLUX, unit
 from .kernels.resolve import make_dry_land, make_resolve
 from .ledger import read_energy
 from .plan import Plan, make_plan
-from .receiver import receiver_heights
 from .result import Result
 from .state import SceneState
 
@@ -114,14 +113,14 @@ class Renderer:
         start = perf_counter()
         wp.synchronize_device(self.plan.device)
         waited = perf_counter() - start if self.plan.device != "cpu" else 0.0
-        facts, assert_time = self.plan.facts, self._time or 0.0
+        facts = self.plan.facts
         caustic_map = self._shaped.numpy().copy()
         energy = read_energy(self.plan, self._ledgers.numpy(), caustic_map, self._dry.numpy())
         return Result(
             scene=facts.scene,
             method=self.plan.method,
             device=self.plan.device,
-            time=assert_time,
+            time=self._time or 0.0,
             plan=self.plan,
             caustic_map=caustic_map,
             energy=energy,
@@ -195,8 +194,8 @@ class Renderer:
             if name in values:
                 arguments.append(values[name])
             else:
-                empty = wp.empty((0,) * argument.type.ndim, dtype=argument.type.dtype, device=self.plan.device)
-                arguments.append(empty)
+                kind: Any = argument.type
+                arguments.append(wp.empty((0,) * kind.ndim, dtype=kind.dtype, device=self.plan.device))
         return wp.launch(kernel, dim=dim, inputs=arguments, device=self.plan.device, record_cmd=True)
 
     def _run(self, lane: int) -> None:

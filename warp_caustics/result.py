@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from .plan import Plan
     from .scene import Scene
 
+UNITS = "unit of sun.irradiance"
+"""What a map's values are in: whatever the scene gives the sun in, W/m² when that is a real one."""
+
 OVER_LIT_LIMIT = 0.01
 """Share of the light that may enter twice before it is worth a warning."""
 
@@ -95,8 +98,16 @@ class Result:
             )
         return notes
 
-    def save(self, path: str | os.PathLike[str]) -> Path:
+    def save(self, path: str | os.PathLike[str], limits: tuple[float, float] | None = None) -> Path:
         """Write the map as EXR, or as a PNG picture, by the file's ending; whole, or not at all.
+
+        Parameters
+        ----------
+        path
+            A file that ends in ``.exr`` or ``.png``.
+        limits
+            Values of black and white in a PNG, in the map's own units; each picture has its own if not given, which
+            would flicker in a sequence (:func:`warp_caustics.tone.value_limits` of its first frame does not).
 
         Raises
         ------
@@ -109,14 +120,16 @@ class Result:
 
         path = Path(path)
         scene = self.scene
-        units = "in units of sun.irradiance"
         if path.suffix.lower() == ".exr":
             write_map(
                 path, self.caustic_map, scene_text=scene.to_toml(), version=__version__, method=self.method,
-                units=units, origin=scene.map.origin, size=scene.map.size, energy=self.energy, time=self.time,
+                units=UNITS, origin=scene.map.origin, size=scene.map.size, energy=self.energy, time=self.time,
             )  # fmt: skip
         elif path.suffix.lower() == ".png":
-            write_png(path, self.caustic_map, origin=scene.map.origin, size=scene.map.size, units=units)
+            write_png(
+                path, self.caustic_map, origin=scene.map.origin, size=scene.map.size, units=UNITS, limits=limits,
+                title=f"{scene.name}, {self.method}, t = {self.time:g} s",
+            )  # fmt: skip
         else:
             raise InputError(f"{path}: expected a file that ends in .exr or .png")
         return path

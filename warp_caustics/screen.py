@@ -72,8 +72,8 @@ def _sample(scene: Scene, image: np.ndarray, points: np.ndarray) -> np.ndarray:
     columns, rows = scene.map.resolution
     with np.errstate(invalid="ignore"):
         at = (points[..., :2] - scene.map.origin) / scene.map.size * (columns, rows)
-        inside = ((at >= 0.0) & (at <= (columns, rows))).all(axis=-1)
-    at = np.clip(np.where(inside[..., None], at, 0.0) - 0.5, 0.0, (columns - 1.0, rows - 1.0))
+        inside = np.logical_and(at >= 0.0, at <= (columns, rows)).all(axis=-1)
+    at = np.clip(np.where(np.expand_dims(inside, -1), at, 0.0) - 0.5, 0.0, (columns - 1.0, rows - 1.0))
     low = np.minimum(at.astype(int), (max(columns - 2, 0), max(rows - 2, 0)))
     high = np.minimum(low + 1, (columns - 1, rows - 1))
     u, v = np.moveaxis(at - low, -1, 0)

@@ -13,6 +13,7 @@ from .kernels.lattice import Lattice
 from .kernels.photon import Scene, SunSample
 from .kernels.surface import Surface
 from .kernels.waves import Wave
+from .receiver import closed_terrain
 from .water import phases
 
 if TYPE_CHECKING:
@@ -114,12 +115,12 @@ class SceneState:
         origin, level = np.asarray(facts.scene.map.origin, dtype=np.float64), facts.scene.water.level
         if facts.spec.receiver != "waves":
             return self._surface(facts.assets.terrain, None, level)
-        terrain = facts.scene.receiver.terrain
+        terrain = closed_terrain(facts.scene)
         table = np.zeros(len(terrain.waves), dtype=Wave.numpy_dtype())
         for i, wave in enumerate(terrain.waves):
             turn = np.mod(wave.phase + np.dot(wave.wavevector, origin), 2.0 * np.pi)
             table[i] = (wave.amplitude, wave.wavevector, turn)
-        waves = wp.array(table, dtype=Wave, device=self._device)
+        waves: wp.array = wp.array(table, dtype=Wave, device=self._device)
         self._keep.append(waves)
         surface = self._surface(None, waves)
         surface.base = float(terrain.base + np.dot(terrain.slope, origin) - level)

@@ -93,18 +93,22 @@ def render(
 
     start_warp()
     from warp_caustics.renderer import Renderer
+    from warp_caustics.tone import value_limits
 
     interrupt = Interrupt()
     milliseconds = []
+    limits = None
     with interrupt.watch():
         with report.working("building kernels"):
             renderer = Renderer(loaded, method=method, device=device, threads=threads)
         for index in report.progress(frames or 1):
             renderer.render(time + index / fps)
             result = renderer.result()
+            # One scale for all pictures of a sequence, or it would flicker.
+            limits = limits or value_limits(result.caustic_map)
             for path in paths(index):
                 with interrupt.hold():
-                    result.save(path)
+                    result.save(path, limits=limits)
             milliseconds.append(1e3 * result.seconds)
     report.print_result(
         result, files=outputs, frames=frames, milliseconds=milliseconds, compile_seconds=renderer.compile_seconds

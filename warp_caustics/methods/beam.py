@@ -38,7 +38,9 @@ def beam(facts: Facts) -> Program:
     buffers = [*waves.buffers, Buffer("planes", "float32", (2 + flux_planes(spec), *corners), 4, per_lane=True)]
     if spec.breaks:
         passes.append(
-            Pass("torn", "cells at an edge, followed ray by ray", lambda: make_torn(spec), lambda strip: (strip, columns))
+            Pass(
+                "torn", "cells at an edge, followed ray by ray", lambda: make_torn(spec), lambda strip: (strip, columns)
+            )
         )
         buffers.append(Buffer("state", "uint8", corners, 1, per_lane=True))
         buffers.append(Buffer("torn_cells", "uint8", (rows, columns), 1, per_lane=True))

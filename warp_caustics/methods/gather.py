@@ -14,6 +14,9 @@ from ..window import Lattice
 if TYPE_CHECKING:
     from ..facts import Facts
 
+LEAST_M = 2
+"""A box overlaps two rows of pixels, so one neighbour each way is the least."""
+
 BOX_REACH = 1.0
 """A sample's box reaches into the next pixel."""
 
@@ -72,9 +75,6 @@ def _window(facts: Facts) -> tuple[int, int]:
     """N and M: those of the scene, or wide enough for the largest deflection from the illumination centre."""
     settings = facts.scene.method.gather
     widest = np.ceil(np.maximum(-facts.deviation[0], facts.deviation[1]) + BOX_REACH)
-    n = settings.n if settings.n is not None else 2 * int(widest[0]) + 1
-    if settings.m is not None:
-        m = settings.m
-    else:
-        m = settings.n - 1 if settings.n is not None else 2 * int(widest[1])
-    return n, max(m, 2)
+    n = 2 * int(widest[0]) + 1 if settings.n is None else settings.n
+    m = 2 * int(widest[1]) if settings.n is None else max(settings.n - 1, LEAST_M)
+    return n, m if settings.m is None else settings.m
