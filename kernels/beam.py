@@ -86,7 +86,7 @@ def common_state(state: wp.array2d[wp.uint8], row: int, column: int, first: int,
     for j in range(first, first + count):
         for i in range(first, first + count):
             if int(state[row + j, column + i]) != common:
-                common = 0
+                common = int(0)
     return common
 
 
@@ -125,7 +125,7 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
         high = at_rest(lattice, index, 1.0)
         base = pixel_base(low)
         cubic = int(wp.static(int(refine)))
-        whole = 1
+        whole = int(1)
         if wp.static(bounded):
             # A cell that the water's border cuts keeps what is left of it, without the neighbours' cubic.
             before = to_rest(lattice, on_water(lattice, at_rest(lattice, index, -1.0), shift), shift)
@@ -134,8 +134,8 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
             high = to_rest(lattice, on_water(lattice, high, shift), shift)
             uncut = 2.99 * lattice.step
             if after[0] - before[0] < uncut or after[1] - before[1] < uncut:
-                cubic = 0
-                whole = 0
+                cubic = int(0)
+                whole = int(0)
             if high[0] <= low[0] or high[1] <= low[1]:
                 torn_cells_out[row, column] = wp.uint8(0)
                 return
@@ -144,10 +144,10 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
             common = common_state(state, row, column, 1, 2)
             if common_state(state, row, column, 0, 4) == 0:
                 # No interpolant reaches across an edge: beside one, a cell is followed ray by ray like those on it.
-                cubic = 0
+                cubic = int(0)
                 if common == LANDED or common == LANDED_ON_OBJECT:
-                    common = 0
-        n = 1
+                    common = int(0)
+        n = int(1)
         if wp.static(refine or edges):
             bend = float(0.0)
             if whole == 1 and common != 0:
@@ -158,7 +158,7 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
                 n = wp.clamp(int(wp.ceil(wp.sqrt(bend / left))), 1, wp.static(FINEST))
             if wp.static(edges):
                 if bend > wp.static(TORN_BEND):
-                    common = 0
+                    common = int(0)
         if wp.static(breaks):
             torn_cells_out[row, column] = wp.uint8(wp.where(common == 0, 1, 0))
         bin = row * 31 + column

@@ -18,7 +18,7 @@ Polygon = wp.types.matrix(shape=(8, 3), dtype=wp.float32)  # corners (X, Y, Z) i
 def outside_code(view: View, corner: wp.vec3, columns: float, rows: float) -> int:
     """Bits: left of, right of, below, above the picture (0 to 3), before the near plane (4), off the guard band (5)."""
     w = homogeneous_w(view, corner[2])
-    code = 0
+    code = int(0)
     if corner[0] < 0.0:
         code |= 1
     if corner[0] > columns * w:
@@ -59,7 +59,7 @@ def clip(view: View, polygon: Polygon, count: int, plane: int):
     triangles that share the edge cut it at the same point.
     """
     kept = Polygon()
-    n = 0
+    n = int(0)
     if count > 0:
         before = polygon[count - 1]
         depth_before = inside_distance(view, before, plane)
@@ -88,7 +88,7 @@ def clip(view: View, polygon: Polygon, count: int, plane: int):
 def visible_polygon(view: View, a: wp.vec3, b: wp.vec3, c: wp.vec3, columns: int, rows: int):
     """Cut a triangle to the near plane and the guard band: corners and their count, 0 if nothing is left."""
     polygon = Polygon()
-    count = 0
+    count = int(0)
     code_a = outside_code(view, a, float(columns), float(rows))
     code_b = outside_code(view, b, float(columns), float(rows))
     code_c = outside_code(view, c, float(columns), float(rows))

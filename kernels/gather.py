@@ -59,11 +59,11 @@ def make_intersections(spec: Spec) -> wp.Kernel:
         flux = flux_type()
         inside = box_inside(float(index[0]) + 0.5 + offset[0], lattice.map[0])
         inside *= box_inside(float(index[1]) + 0.5 + offset[1], lattice.map[1])
-        on_the_water = 1
+        on_the_water = int(1)
         if wp.static(bounded):
             beside = wp.vec2(rest[0] * lattice.pixel[0], rest[1] * lattice.pixel[1]) - light.rest_shift
             if wp.length(water - beside) > 0.5 * lattice.step * wp.min(lattice.pixel[0], lattice.pixel[1]):
-                on_the_water = 0
+                on_the_water = int(0)
         if on_the_water == 1:
             if result.state == LANDED:
                 for c in range(wp.static(channels)):
