@@ -55,6 +55,7 @@ class Facts:
     ground: Bounds
     pixel: np.ndarray
     deviation: tuple[np.ndarray, np.ndarray]
+    backlund_deviation: tuple[np.ndarray, np.ndarray]
     longest_way: float
     reasons: tuple[Reason, ...]
     warnings: tuple[str, ...] = field(default=())
@@ -91,8 +92,10 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     reference = 0.5 * (max(0.0, -ground.highest) + max(0.0, -ground.lowest))
     if receiver_kind(scene) == "waves":
         reference = depth
-    ends = [deviation_bounds(reach, depths, reference, pixel) for reach in reaches]
-    deviation = (np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0))
+    deviation = _deviation([((r.low, r.high), r.rest) for r in reaches], depths, reference, pixel)
+    # Eq. 3.3 meets the ground along the unrefracted ray, so wherever that is.
+    anywhere = (0.0, max(0.0, -wide.lowest) + amplitude)
+    by_backlund = _deviation([((r.backlund_low, r.backlund_high), r.rest) for r in reaches], anywhere, reference, pixel)
     spec, reasons = _specify(scene, assets, suns, slopes, amplitude, reaches, wide)
     return Facts(
         scene=scene,
@@ -109,10 +112,22 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         ground=wide,
         pixel=pixel,
         deviation=deviation,
+        backlund_deviation=by_backlund,
         longest_way=depths[1] * np.hypot(1.0, steepest),
         reasons=reasons,
         warnings=tuple(warnings),
     )
+
+
+def _deviation(
+    ways: list[tuple[tuple[np.ndarray, ...], np.ndarray]],
+    depths: tuple[float, float],
+    reference: float,
+    pixel: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of the deviation [pixels] over all directions of the sun."""
+    ends = [deviation_bounds(bounds, rest, depths, reference, pixel) for bounds, rest in ways]
+    return np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)
 
 
 def _ior(scene: Scene) -> tuple[float, list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -9,9 +10,9 @@ from dataclasses import dataclass
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import warp as wp
 
+from .errors import InputError
 from .kernels.deposit import ACCUMULATOR, FLUX, unit
 from .kernels.resolve import make_dry_land, make_resolve
 from .ledger import read_energy
@@ -93,7 +94,14 @@ class Renderer:
         -------
         Frame
             On the device; on a GPU the work may still be under way.
+
+        Raises
+        ------
+        InputError
+            If the time is not finite.
         """
+        if not math.isfinite(time):
+            raise InputError(f"time: expected a finite number of seconds, got {time}")
         start = perf_counter()
         self._state.write(time)
         if self._pool is None:
@@ -234,10 +242,6 @@ def render(
     InputError
         As :func:`~warp_caustics.make_plan`.
     """
-    if not np.isfinite(time):
-        from .errors import InputError
-
-        raise InputError(f"time: expected a finite number of seconds, got {time}")
     renderer = Renderer(scene, method, device, threads)
     renderer.render(time)
     return renderer.result()

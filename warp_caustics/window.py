@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,8 @@ class Reach:
         Horizontal way by unit depth, from a surface at rest, ``[2]``.
     low, high : ndarray
         Its bounds over all slopes of the surface, ``[2]`` each.
+    backlund_low, backlund_high : ndarray
+        The bounds by Bäcklund's Eq. 3.3, which lands too far: the unrefracted way, projected on the refracted one.
     steepest : float
         The largest tangent of a refracted ray's angle from the vertical.
     clipped : bool
@@ -38,6 +41,8 @@ class Reach:
     rest: np.ndarray
     low: np.ndarray
     high: np.ndarray
+    backlund_low: np.ndarray
+    backlund_high: np.ndarray
     steepest: float
     clipped: bool
 
@@ -67,18 +72,38 @@ def refraction_reach(direction: np.ndarray, slopes: np.ndarray, ior: float) -> R
     down = np.maximum(down, np.finfo(np.float64).tiny)
     way = rays[:, :2] / down[:, None]
     steepest = np.linalg.norm(way, axis=1).max()
+    by_backlund = rays[:, :2] * (rays @ direction / -direction[2])[:, None]
     return Reach(
-        -rest[:2] / rest[2], way.min(axis=0), way.max(axis=0), float(steepest), bool((down > -rays[:, 2]).any())
+        rest=-rest[:2] / rest[2],
+        low=way.min(axis=0),
+        high=way.max(axis=0),
+        backlund_low=by_backlund.min(axis=0),
+        backlund_high=by_backlund.max(axis=0),
+        steepest=float(steepest),
+        clipped=bool((down > -rays[:, 2]).any()),
     )
 
 
 def deviation_bounds(
-    reach: Reach, depths: tuple[float, float], reference: float, pixel: np.ndarray
+    ways: Sequence[np.ndarray], rest: np.ndarray, depths: tuple[float, float], reference: float, pixel: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Smallest and largest distance of a landing from its place at rest, ``[2]`` each [pixels]."""
-    ends = np.array([depth * way for depth in depths for way in (reach.low, reach.high)])
-    shift = reference * reach.rest
-    return (ends.min(axis=0) - shift) / pixel, (ends.max(axis=0) - shift) / pixel
+    """Bound how far from its place at rest light lands, ``[2]`` each way [pixels].
+
+    Parameters
+    ----------
+    ways : sequence of ndarray
+        Bounds of the horizontal way by unit depth.
+    rest : ndarray
+        The way by unit depth at rest.
+    depths : (float, float)
+        Least and largest depth of the receiver under the surface [m].
+    reference : float
+        Depth at which a lattice is anchored [m].
+    pixel : ndarray
+        Width and height of a pixel [m].
+    """
+    ends = np.array([depth * way for depth in depths for way in ways]) - reference * rest
+    return ends.min(axis=0) / pixel, ends.max(axis=0) / pixel
 
 
 def lattice_over(low: np.ndarray, high: np.ndarray, resolution: tuple[int, int], step: float) -> Lattice:

@@ -22,7 +22,7 @@ def photon(facts: Facts) -> Program:
     """Plan the one pass that follows photons from the surface into the map."""
     settings = facts.scene.method.photon
     spec = replace(facts.spec, backlund=settings.projection == "backlund")
-    low, high = facts.deviation
+    low, high = facts.backlund_deviation if spec.backlund else facts.deviation
     step = float(np.sqrt(1.0 / settings.photons_per_pixel))
     widths = {"point": 0.0, "pixel": 1.0, "cell": step}
     width = widths[settings.footprint] if isinstance(settings.footprint, str) else float(settings.footprint)
