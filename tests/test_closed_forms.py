@@ -12,7 +12,7 @@ from scenery import METHODS, relative_l2, render, sample_points, save_heights, s
 # photons a pixel leave that blur, and the gather's one sample a pixel leaves gaps where light is drawn apart.
 SMOOTH_ERROR = {"beam": 2e-3, "photon": 1e-2, "gather": 0.15}
 FOLDED_ERROR = {"beam": 5e-3, "photon": 0.15, "gather": 0.4}
-CREST_ERROR = {"beam": 5e-3, "photon": 0.02, "gather": 0.1}
+CREST_ERROR = {"beam": 1e-2, "photon": 0.02, "gather": 0.1}
 CHOSEN = {"photon": {"photons_per_pixel": 16.0, "footprint": "pixel"}}
 
 IOR = 1.333

@@ -18,6 +18,7 @@ COLUMNS, ROWS = 8, 6
 SHARE_TOLERANCE = 2e-6
 # The promise for box splats inside the map; shares of float32 keep it by an order.
 ENERGY_TOLERANCE = 1e-5
+EDGE = 1e-5  # [pixels] so near the border, rounding decides on which side of it a point lies
 # Some thousand additions to one float32 pixel, each rounded to 6e-8 of what is there already.
 FLOAT32_SUM_TOLERANCE = 1e-4
 # Additions in float64 of fluxes that float32 has rounded.
@@ -203,10 +204,28 @@ def test_fixed_point_does_not_depend_on_the_device(device):
     assert (sums(at, (1.0, 1.0), flux, device)[2] == sums(at, (1.0, 1.0), flux, "cpu")[2]).all()
 
 
+NARROW = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8]
+
+
+@pytest.mark.xfail(strict=True, reason="BUG: a box about as narrow as a coordinate's last digit gains or loses flux")
+@pytest.mark.parametrize("width", NARROW)
+def test_a_narrow_box_keeps_its_flux(device, width):
+    """A footprint is any number: as it narrows, a box becomes a point, whose flux is all there."""
+    at = rounded(np.random.default_rng(9).uniform(1.0, [COLUMNS - 1.0, ROWS - 1.0], (300, 2)))
+    # Bases as far off as deep, choppy water sends light: the place is a deviation of some hundred pixels.
+    bases = np.tile([-100, 120], (300, 1))
+    maps, inside = splat(at - bases, (width, width), device, bases)
+    assert np.abs(inside - 1.0).max() < ENERGY_TOLERANCE
+    assert np.abs(maps.sum(axis=(1, 2)) - 1.0).max() < ENERGY_TOLERANCE
+
+
+widths = st.floats(0.125, 12.0, width=32) | st.just(0.0)
+
+
 @settings(deadline=None, max_examples=100)
 @given(
     at=st.tuples(st.floats(-10.0, 20.0, width=32), st.floats(-10.0, 20.0, width=32)),
-    width=st.tuples(st.floats(0.0, 12.0, width=32), st.floats(0.0, 12.0, width=32)),
+    width=st.tuples(widths, widths),
     base=st.tuples(st.integers(-5, 12), st.integers(-5, 12)),
 )
 def test_any_box_conserves_its_flux(at, width, base):
@@ -214,11 +233,11 @@ def test_any_box_conserves_its_flux(at, width, base):
     at = rounded([at]) - base
     maps, inside = splat(at, width, "cpu", np.array([base]))
     assert maps.min() >= 0.0
-    # A box narrower than a coordinate's last digit, 1e-6, is all rounding.
-    narrow = 0.0 < min(width) < 1e-3 or 0.0 < max(width) < 1e-3
-    spare = 1.0 if narrow else ENERGY_TOLERANCE + 4e-6 / max(min(width), 1e-3)
-    assert abs(maps.sum() - inside[0]) < SHARE_TOLERANCE * (1.0 + inside[0])
+    spare = 2.0 * ENERGY_TOLERANCE / max(min(width), 0.5)  # coordinates of 1e-6 over the width
+    assert abs(maps.sum() - inside[0]) < SHARE_TOLERANCE
     assert inside[0] < 1.0 + spare
     low, high = (rounded(at)[0] + base + s * 0.5 * np.array(width) for s in (-1.0, 1.0))
-    if (low > 0.0).all() and (high < [COLUMNS, ROWS]).all():
+    if (low > EDGE).all() and (high < np.array([COLUMNS, ROWS]) - EDGE).all():
         assert abs(inside[0] - 1.0) < spare
+    if (low > np.array([COLUMNS, ROWS]) + EDGE).any() or (high < -EDGE).any():
+        assert inside[0] == 0.0

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .kernels.spec import Spec
-from .receiver import Bounds, check_covered, receiver_bounds, receiver_kind, rest_depth
+from .receiver import SHALLOWEST, Bounds, check_covered, receiver_bounds, receiver_kind, rest_depth
 from .scene import IOR_TABLE, JERLOV_TABLE
 from .sun import MOST_DIRECTIONS, disk_count, disk_directions
 from .water import amplitude_bound, extreme_slopes
@@ -113,7 +113,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         pixel=pixel,
         deviation=deviation,
         backlund_deviation=by_backlund,
-        longest_way=depths[1] * np.hypot(1.0, steepest),
+        longest_way=float(max(amplitude - wide.lowest, SHALLOWEST) * np.hypot(1.0, steepest)),
         reasons=reasons,
         warnings=tuple(warnings),
     )

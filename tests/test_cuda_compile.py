@@ -1,0 +1,57 @@
+"""Every kernel of the pipeline compiles for CUDA, on a machine without a GPU too (NVRTC comes with Warp)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import warp as wp
+
+from warp_caustics.kernels.beam import make_cells, make_corners
+from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
+from warp_caustics.kernels.resolve import make_dry_land, make_resolve
+from warp_caustics.kernels.scatter import make_scatter
+from warp_caustics.kernels.spec import Spec
+from warp_caustics.kernels.torn import make_torn
+from warp_caustics.kernels.wave_table import wave_table
+
+# The oldest architecture that Warp 1.19 and the goals of this library share: newer ones run its PTX.
+ARCHITECTURE = 80
+
+EVERYTHING = Spec(
+    water="grid",
+    receiver="grid",
+    objects=True,
+    bounded=True,
+    shore=True,
+    occluders=True,
+    self_shadow=True,
+    faces_away=True,
+    exits=True,
+    tears=True,
+    fresnel=True,
+    attenuation="path",
+    channels=3,
+    accumulate="fixed",
+)
+BACKLUND = Spec(receiver="mesh", tears=True, backlund=True, attenuation="depth", channels=3, accumulate="float64")
+
+KERNELS = {
+    "wave_table": lambda: wave_table,
+    "corners": lambda: make_corners(EVERYTHING),
+    "cells": lambda: make_cells(EVERYTHING, True),
+    "torn": lambda: make_torn(EVERYTHING),
+    "scatter": lambda: make_scatter(BACKLUND),
+    "intersections": lambda: make_intersections(Spec()),
+    "rows": lambda: make_rows(1),
+    "columns": lambda: make_columns(3),
+    "resolve": lambda: make_resolve("fixed", 3, 3),
+    "dry_land": lambda: make_dry_land(EVERYTHING),
+}
+
+
+@pytest.mark.parametrize("name", KERNELS)
+def test_compiles_for_cuda(name: str, tmp_path: Path) -> None:
+    wp.compile_aot_module(KERNELS[name]().module, device=None, arch=ARCHITECTURE, module_dir=tmp_path)
+    (compiled,) = (*tmp_path.glob("*.ptx"), *tmp_path.glob("*.cubin"))
+    assert name.encode() in compiled.read_bytes()
