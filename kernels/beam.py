@@ -137,7 +137,8 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
                 cubic = int(0)
                 whole = int(0)
             if high[0] <= low[0] or high[1] <= low[1]:
-                torn_cells_out[row, column] = wp.uint8(0)
+                if wp.static(breaks):
+                    torn_cells_out[row, column] = wp.uint8(0)
                 return
         common = int(LANDED)
         if wp.static(breaks):
