@@ -13,7 +13,7 @@ import functools
 import warp as wp
 
 from .deposit import ACCUMULATOR, FLUX
-from .lattice import Lattice, at_rest, deviation, on_water, pixel_base, pixel_fraction, to_rest
+from .lattice import Lattice, at_rest, clip_to_water, deviation, on_water, pixel_base, pixel_fraction, share_of_cell
 from .ledger import make_book_landed, make_count_unlanded
 from .patch import BORDER, arrived_plane, integral_weights, make_deposit_patch, plane_bend, plane_mean, thickness
 from .photon import LANDED, LANDED_ON_OBJECT, Scene, SunSample, make_photon
@@ -128,10 +128,10 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
         whole = int(1)
         if wp.static(bounded):
             # A cell that the water's border cuts keeps what is left of it, without the neighbours' cubic.
-            before = to_rest(lattice, on_water(lattice, at_rest(lattice, index, -1.0), shift), shift)
-            after = to_rest(lattice, on_water(lattice, at_rest(lattice, index, 2.0), shift), shift)
-            low = to_rest(lattice, on_water(lattice, low, shift), shift)
-            high = to_rest(lattice, on_water(lattice, high, shift), shift)
+            before = clip_to_water(lattice, at_rest(lattice, index, -1.0), shift)
+            after = clip_to_water(lattice, at_rest(lattice, index, 2.0), shift)
+            low = clip_to_water(lattice, low, shift)
+            high = clip_to_water(lattice, high, shift)
             uncut = 2.99 * lattice.step
             if after[0] - before[0] < uncut or after[1] - before[1] < uncut:
                 cubic = int(0)
@@ -164,7 +164,7 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
             torn_cells_out[row, column] = wp.uint8(wp.where(common == 0, 1, 0))
         bin = row * 31 + column
         weights = integral_weights(cubic)
-        share = (high[0] - low[0]) * (high[1] - low[1]) / (lattice.step * lattice.step)
+        share = share_of_cell(lattice, low, high)
         incident = share * plane_mean(planes, 2, row, column, weights)
         transmitted = share * plane_mean(planes, wp.static(transmitted_plane), row, column, weights)
         if common == LANDED or common == LANDED_ON_OBJECT:

@@ -10,7 +10,7 @@ import functools
 import warp as wp
 
 from .deposit import FLUX
-from .lattice import Lattice, at_rest, deviation, on_water
+from .lattice import Lattice, at_rest, clip_to_water, deviation, on_water, share_of_cell
 from .ledger import make_book_landed, make_count_unlanded
 from .photon import LANDED, Scene, SunSample, make_photon
 from .spec import Spec
@@ -51,26 +51,28 @@ def make_intersections(spec: Spec) -> wp.Kernel:
         row, column = wp.tid()
         light = suns[sun]
         index = wp.vec2i(lattice.first[0] + column, lattice.first[1] + row)
-        rest = at_rest(lattice, index, 0.5)
+        pixel = at_rest(lattice, index, 0.5)
+        rest = pixel
+        share = float(1.0)
+        if wp.static(bounded):
+            # A sample at the water's border stands for what is left of its cell, from the middle of that.
+            low = clip_to_water(lattice, at_rest(lattice, index, 0.0), light.rest_shift)
+            high = clip_to_water(lattice, at_rest(lattice, index, 1.0), light.rest_shift)
+            rest = 0.5 * (low + high)
+            share = wp.max(share_of_cell(lattice, low, high), 0.0)
         water = on_water(lattice, rest, light.rest_shift)
         z = water_on_lattice(scene, column_waves, row_waves, column, row, water)
         result = photon(scene, light.direction, water, z)
-        offset = deviation(lattice, result.distance, result.direction, light.rest_shift)
+        offset = deviation(lattice, result.distance, result.direction, light.rest_shift) + rest - pixel
+        bin = row * 31 + column
         flux = flux_type()
-        inside = box_inside(float(index[0]) + 0.5 + offset[0], lattice.map[0])
-        inside *= box_inside(float(index[1]) + 0.5 + offset[1], lattice.map[1])
-        on_the_water = int(1)
-        if wp.static(bounded):
-            beside = wp.vec2(rest[0] * lattice.pixel[0], rest[1] * lattice.pixel[1]) - light.rest_shift
-            if wp.length(water - beside) > 0.5 * lattice.step * wp.min(lattice.pixel[0], lattice.pixel[1]):
-                on_the_water = int(0)
-        if on_the_water == 1:
-            if result.state == LANDED:
-                for c in range(wp.static(channels)):
-                    flux[c] = result.arrived[c]
-                book_landed(ledger_out, row * 31 + column, result.incident, result.transmitted, flux, inside * flux)
-            else:
-                count_unlanded(ledger_out, row * 31 + column, result.state, result.incident, result.transmitted)
+        if result.state == LANDED:
+            for c in range(wp.static(channels)):
+                flux[c] = share * result.arrived[c]
+            inside = box_inside(pixel[0] + offset[0], lattice.map[0]) * box_inside(pixel[1] + offset[1], lattice.map[1])
+            book_landed(ledger_out, bin, share * result.incident, share * result.transmitted, flux, inside * flux)
+        else:
+            count_unlanded(ledger_out, bin, result.state, share * result.incident, share * result.transmitted)
         landing_out[row, column] = offset
         flux_out[row, column] = flux
 

@@ -35,9 +35,16 @@ def on_water(lattice: Lattice, rest: wp.vec2, shift: wp.vec2) -> wp.vec2:
 
 
 @wp.func
-def to_rest(lattice: Lattice, water: wp.vec2, shift: wp.vec2) -> wp.vec2:
-    """Rest coordinate [pixels] of a point of the water: :func:`on_water` the other way, for clipped points."""
+def clip_to_water(lattice: Lattice, rest: wp.vec2, shift: wp.vec2) -> wp.vec2:
+    """A rest coordinate [pixels] moved back to the water's border where it lies beyond."""
+    water = on_water(lattice, rest, shift)
     return wp.vec2((water[0] + shift[0]) / lattice.pixel[0], (water[1] + shift[1]) / lattice.pixel[1])
+
+
+@wp.func
+def share_of_cell(lattice: Lattice, low: wp.vec2, high: wp.vec2) -> float:
+    """Area of a square at rest [pixels], as a share of a whole cell's."""
+    return (high[0] - low[0]) * (high[1] - low[1]) / (lattice.step * lattice.step)
 
 
 @wp.func

@@ -5,7 +5,7 @@ import functools
 import warp as wp
 
 from .deposit import ACCUMULATOR, FLUX
-from .lattice import Lattice, at_rest, deviation, on_water, pixel_base, pixel_fraction, to_rest
+from .lattice import Lattice, at_rest, clip_to_water, deviation, on_water, pixel_base, pixel_fraction, share_of_cell
 from .ledger import make_book_landed, make_count_unlanded
 from .photon import LANDED, LANDED_ON_OBJECT, Scene, SunSample, make_photon
 from .spec import Spec
@@ -47,10 +47,10 @@ def make_scatter(spec: Spec) -> wp.Kernel:
         rest = at_rest(lattice, index, 0.5)
         share = float(1.0)
         if wp.static(bounded):
-            low = to_rest(lattice, on_water(lattice, at_rest(lattice, index, 0.0), light.rest_shift), light.rest_shift)
-            high = to_rest(lattice, on_water(lattice, at_rest(lattice, index, 1.0), light.rest_shift), light.rest_shift)
+            low = clip_to_water(lattice, at_rest(lattice, index, 0.0), light.rest_shift)
+            high = clip_to_water(lattice, at_rest(lattice, index, 1.0), light.rest_shift)
             rest = 0.5 * (low + high)
-            share = (high[0] - low[0]) * (high[1] - low[1]) / (lattice.step * lattice.step)
+            share = share_of_cell(lattice, low, high)
             if not share > 0.0:
                 return
         water = on_water(lattice, rest, light.rest_shift)

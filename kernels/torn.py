@@ -12,7 +12,7 @@ import warp as wp
 
 from .coverage import make_deposit_triangle
 from .deposit import ACCUMULATOR, FLUX
-from .lattice import Lattice, at_rest, on_water, pixel_base, pixel_fraction, to_rest
+from .lattice import Lattice, at_rest, clip_to_water, on_water, pixel_base, pixel_fraction, share_of_cell
 from .ledger import EMITTED, OVER_LIT, SHADED, make_book_landed, make_count_unlanded, tally
 from .optics import facing, refract_at_slope
 from .photon import LANDED, LANDED_ON_OBJECT, Photon, Scene, SunSample, make_land, make_lit, make_wet
@@ -54,7 +54,7 @@ def make_torn(spec: Spec) -> wp.Kernel:
     count_unlanded = make_count_unlanded(spec)
     dtype = ACCUMULATOR[spec.accumulate]
     flux_type = FLUX[spec.channels]
-    channels, self_shadow = spec.channels, spec.self_shadow
+    channels, self_shadow, bounded = spec.channels, spec.self_shadow, spec.bounded
     parts = PARTS_WITH_EXITS if spec.exits else PARTS
 
     @wp.func
@@ -69,7 +69,7 @@ def make_torn(spec: Spec) -> wp.Kernel:
         z = water_at(scene.water.surface, water[0], water[1])
         origin = wp.vec3(water[0], water[1], z[0])
         slope = wp.vec2(z[1], z[2])
-        share = (high[0] - low[0]) * (high[1] - low[1]) / (lattice.step * lattice.step)
+        share = share_of_cell(lattice, low, high)
         share *= wet(scene.receiver, origin, slope, size)
         incident = facing(sun.direction, slope)
         if incident <= 0.0:
@@ -140,8 +140,9 @@ def make_torn(spec: Spec) -> wp.Kernel:
         index = wp.vec2i(lattice.first[0] + column, first_row + row)
         low = at_rest(lattice, index, 0.0)
         high = at_rest(lattice, index, 1.0)
-        low = to_rest(lattice, on_water(lattice, low, light.rest_shift), light.rest_shift)
-        high = to_rest(lattice, on_water(lattice, high, light.rest_shift), light.rest_shift)
+        if wp.static(bounded):
+            low = clip_to_water(lattice, low, light.rest_shift)
+            high = clip_to_water(lattice, high, light.rest_shift)
         count = int(wp.static(parts))  # a variable, so that the loops are not unrolled
         side = (high - low) / float(count)
         for j in range(count):

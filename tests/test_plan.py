@@ -1,0 +1,360 @@
+"""The plan: what a scene does not need is not compiled, not allocated and not launched, and people can read why."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import warp as wp
+from oracle.cases import sunlight
+from scenery import FREE_METHODS, GENTLE, METHODS, bundled, save_box, save_heights, save_quad, scene, wave
+
+import warp_caustics as wc
+from warp_caustics.kernels.beam import make_cells, make_corners
+from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
+from warp_caustics.kernels.resolve import make_dry_land, make_resolve
+from warp_caustics.kernels.scatter import make_scatter
+from warp_caustics.kernels.torn import make_torn
+
+KERNEL_OF_PASS = {"waves": "wave_table"}  # where a pass has not its kernel's name
+FACTORIES = (
+    make_cells, make_columns, make_corners, make_dry_land, make_intersections, make_resolve, make_rows, make_scatter,
+    make_torn,
+)  # fmt: skip
+KILOBYTE = 1024  # reports of memory are in kilobytes to two digits
+REPORT_ROUNDING = 0.02 * KILOBYTE
+HOST_COPIES = ("suns", "waves")  # written on the host each frame, then copied
+UNITS = {"B": 1, "KB": KILOBYTE, "MB": KILOBYTE**2}
+
+SHALLOWS = {"terrain": {"base": 0.55, "slope": (0.3, 0.1)}}  # comes out of the water inside the map
+HILLS = {"terrain": {"base": 0.2, "waves": [wave(0.1, 9.0, 0.0)]}}  # a ray can pass a crest by and land behind it
+STEEP = [wave(0.8 / 6.0, 6.0, 0.0)]
+LOW_SUN = sunlight(75.0)
+
+
+def plan_of(what, method="beam"):
+    return wc.make_plan(what, method, "cpu", 1)
+
+
+def names(plan):
+    return {buffer.name for buffer in plan.buffers}
+
+
+def shape(plan, name):
+    return next(buffer.shape for buffer in plan.buffers if buffer.name == name)
+
+
+def reason(plan, what):
+    return next(one for one in plan.facts.reasons if one.what == what)
+
+
+# A need, what is said of it, a scene that has it not, and one that has it and is otherwise the same.
+NEEDS = {
+    "Fresnel": ({}, {"medium": {"ior": 1.333, "fresnel": True}}),
+    "attenuation": ({}, {"medium": {"ior": 1.333, "absorption": 0.1}}),
+    "transport by colour": (
+        {"medium": {"ior": 1.333, "absorption": 0.1}},
+        {"medium": {"ior": 1.333, "absorption": (0.3, 0.1, 0.0)}},
+    ),
+    "self-shadow": ({"direction": sunlight(60.0)}, {"waves": STEEP, "direction": LOW_SUN}),
+    "exit through the surface": ({"direction": sunlight(60.0)}, {"waves": [wave(0.2, 10.0, 0.0)], "direction": LOW_SUN}),
+    "march over terrain": ({}, {"receiver": {"terrain": {"base": 0.0}}}),
+    "shore": ({"receiver": {"terrain": {"base": 0.0, "slope": (0.3, 0.1)}}}, {"receiver": SHALLOWS}),
+    "torn cells": ({"receiver": {"terrain": {"base": 0.2}}}, {"receiver": HILLS, "direction": LOW_SUN}),
+    "sun's disk": ({}, {"sun": {"angular_diameter": 5.0}}),
+}
+
+
+@pytest.mark.parametrize("need", NEEDS)
+@pytest.mark.parametrize("method", FREE_METHODS)
+def test_each_need_is_seen_and_said_both_ways(need, method):
+    without, with_it = ({"waves": GENTLE, **changes} for changes in NEEDS[need])
+    plain, full = plan_of(scene(**without), method), plan_of(scene(**with_it), method)
+    assert not reason(plain, need).kept
+    assert reason(full, need).kept
+    assert reason(plain, need).why
+    assert reason(plain, need).why != reason(full, need).why
+    for plan, heading in ((plain, "left out"), (full, "kept")):
+        section = str(plan).split("\nkept\n")[1].split("\nbuffers\n")[0]
+        kept, left_out = section.split("left out\n")
+        assert need in (kept if heading == "kept" else left_out)
+
+
+def test_files_and_meshes_are_needs_too(tmp_path):
+    flat = save_heights(tmp_path, "flat", np.zeros((9, 9)), (-20.0, -20.0), (40.0, 40.0))
+    waves, water = plan_of(scene(GENTLE)), plan_of(scene(height_map=flat))
+    assert not reason(waves, "surface by height map").kept
+    assert reason(water, "surface by height map").kept
+    assert names(waves) - names(water) == {"waves", "column_waves", "row_waves"}
+    assert names(water) - names(waves) == {"water_nodes"}
+    assert "waves" in waves.kernels
+    assert "waves" not in water.kernels
+    bed = plan_of(scene(GENTLE, {"terrain": flat}))
+    assert names(bed) - names(waves) == {"terrain_nodes"}
+    floor = plan_of(scene(GENTLE, {"mesh": save_quad(tmp_path)}))
+    rock = plan_of(scene(GENTLE, {"plane": 0.0, "objects": [{"mesh": save_box(tmp_path), "scale": 0.2}]}))
+    for plan, name in ((floor, "mesh"), (rock, "objects")):
+        assert reason(plan, "BVH").kept
+        assert names(plan) - names(waves) == {name, "state", "torn_cells"}
+    assert not reason(waves, "BVH").kept
+    assert not rock.facts.spec.occluders  # it stays under water
+    tall = [{"mesh": save_box(tmp_path), "scale": 1.5}]
+    assert plan_of(scene(GENTLE, {"plane": 0.0, "objects": tall})).facts.spec.occluders
+
+
+def test_buffers_follow_the_needs():
+    plain = plan_of(scene(GENTLE))
+    planes = shape(plain, "planes")[0]
+    assert planes == 3  # where a corner lands, and its flux
+    expected = {
+        (("fresnel", True),): planes + 1,
+        (("absorption", 0.1),): planes + 1,
+        (("absorption", (0.3, 0.1, 0.0)),): planes + 3,
+        (("jerlov", "II"), ("fresnel", True)): planes + 4,
+    }
+    for medium, count in expected.items():
+        plan = plan_of(scene(GENTLE, medium={"ior": 1.333, **dict(medium)}))
+        assert shape(plan, "planes")[0] == count, medium
+    pixels = 40 * 28
+    by_colour = plan_of(scene(GENTLE, medium={"ior": 1.333, "absorption": (0.3, 0.1, 0.0)}))
+    coloured_sun = plan_of(scene(GENTLE, sun={"irradiance": (1.0, 0.9, 0.8)}))
+    for plan, carried, shown in ((plain, 1, 1), (by_colour, 3, 3), (coloured_sun, 1, 3)):
+        assert shape(plan, "map") == (carried * pixels,)
+        assert shape(plan, "caustic_map") == (shown * pixels,)
+    shadowed = plan_of(scene(STEEP, direction=LOW_SUN))
+    assert names(shadowed) - names(plain) == {"state", "torn_cells"}
+    assert set(shadowed.kernels) - set(plain.kernels) == {"torn"}
+    shore = plan_of(scene(GENTLE, SHALLOWS))
+    assert names(shore) - names(plain) == {"state", "torn_cells", "dry"}
+    assert set(shore.kernels) - set(plain.kernels) == {"torn", "dry_land"}
+    assert shore.bytes > plain.bytes
+
+
+def test_shadows_that_are_not_wanted_are_left_out():
+    shaded, bare = (plan_of(scene(STEEP, direction=LOW_SUN, self_shadow=on), "photon") for on in (True, False))
+    assert shaded.facts.spec.self_shadow
+    assert not bare.facts.spec.self_shadow
+    assert "false" in reason(bare, "self-shadow").why
+    assert bare.facts.spec.faces_away  # what faces away is still unlit
+
+
+def test_every_direction_of_the_sun_is_launched():
+    one, many = plan_of(scene(GENTLE)), plan_of(scene(GENTLE, sun={"angular_diameter": 5.0}))
+    directions = len(many.facts.suns)
+    assert directions > 5
+    assert one.launches == 3 + 1
+    assert many.launches == 3 * directions + 1
+    assert shape(many, "suns") == (directions,)
+    assert many.kernels == one.kernels
+
+
+def test_pool_needs_less_than_beach():
+    for method in FREE_METHODS:
+        pool, beach = (plan_of(bundled(name), method) for name in ("pool", "beach"))
+        assert len(pool.program.passes) <= len(beach.program.passes)
+        assert len(pool.kernels) < len(beach.kernels)
+        assert pool.launches < beach.launches
+        assert len(pool.buffers) < len(beach.buffers)
+        assert pool.bytes < beach.bytes
+        assert sum(r.kept for r in pool.facts.reasons) < sum(r.kept for r in beach.facts.reasons)
+
+
+def test_the_plan_in_print():
+    for name in wc.bundled_scenes():
+        plan = plan_of(bundled(name))
+        text = str(plan)
+        assert text.startswith(f"{name}: method beam (samples_per_pixel = 1.0, refine = True) on cpu, 1 thread(s)\n")
+        for step in plan.program.passes:
+            assert re.search(rf"^  {step.name} +\d+ launch\(es\)  \S", text, re.MULTILINE), step.name
+        for one in plan.facts.reasons:
+            assert f"  {one.what:<28}{one.why}\n" in text
+        for buffer in plan.buffers:
+            assert re.search(rf"^  {buffer.name} .* bytes", text, re.MULTILINE), buffer.name
+        summary = f"{plan.launches} launches, {len(plan.kernels)} kernels, {plan.bytes:,} bytes"
+        assert text.splitlines()[-1 - len(plan.warnings)] == summary
+    warned = scene(GENTLE, medium={"ior": (1.33, 1.34, 1.35)})
+    assert str(plan_of(warned)).splitlines()[-1].startswith("warning: medium.ior")
+
+
+# --- the plan is what is done ---------------------------------------------------------------------------------------
+
+
+class Watch:
+    """Kernels recorded for launching, and launches of a frame."""
+
+    def __init__(self, monkeypatch):
+        self.kernels, self.frame = [], 0
+        record, launch = wp.launch, wp.Launch.launch
+
+        def recording(kernel, *args, **kwargs):
+            self.kernels.append(kernel.func.__name__)
+            return record(kernel, *args, **kwargs)
+
+        def launching(command, *args, **kwargs):
+            self.frame += 1
+            return launch(command, *args, **kwargs)
+
+        monkeypatch.setattr(wp, "launch", recording)
+        monkeypatch.setattr(wp.Launch, "launch", launching)
+
+
+PLANNED = [
+    *((name, method) for name in ("pool", "beach", "tank") for method in FREE_METHODS),
+    ("pool", "gather"),
+]
+
+
+@pytest.mark.parametrize(("name", "method"), PLANNED)
+def test_kernels_and_launches_are_those_of_the_plan(device, name, method, monkeypatch):
+    watch = Watch(monkeypatch)
+    renderer = wc.Renderer(bundled(name), method, device, threads=1)
+    planned = [KERNEL_OF_PASS.get(kernel, kernel) for kernel in renderer.plan.kernels]
+    assert set(watch.kernels) == set(planned)
+    assert len(watch.kernels) == renderer.plan.launches
+    for time in (0.0, 1.0):
+        watch.frame = 0
+        renderer.render(time)
+        assert watch.frame == renderer.plan.launches
+    assert ("torn" in watch.kernels) == (method == "beam" and name != "pool")
+    assert ("dry_land" in watch.kernels) == (name == "beach")
+
+
+def test_kernels_that_are_left_out_are_never_built(device):
+    def built():
+        return {factory.__name__: factory.cache_info().misses for factory in FACTORIES}
+
+    calm = scene(GENTLE, resolution=(24, 20))
+    before = built()
+    wc.Renderer(calm, "photon", device, threads=1)
+    after = built()
+    assert {name for name in after if after[name] > before[name]} <= {"make_scatter", "make_resolve"}
+    wc.Renderer(calm, "beam", device, threads=1)
+    last = built()
+    assert {name for name in last if last[name] > after[name]} <= {"make_corners", "make_cells", "make_resolve"}
+    wc.Renderer(calm, "beam", device, threads=1)
+    assert built() == last  # a second one takes the kernels of the first
+
+
+def allocated(report, device):
+    """Bytes of all allocations on a device, from Warp's report."""
+    match = re.search(rf"Total allocations:.*?\n\s+{re.escape(device)}\s+\d+ \(([\d.]+) (B|KB|MB)\)", report, re.DOTALL)
+    return float(match[1]) * UNITS[match[2]] if match else 0.0
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("absorption", [0.0, (0.3, 0.1, 0.0)])
+def test_bytes_are_those_allocated(device, method, absorption):
+    medium = {"ior": 1.333, "absorption": absorption}
+    what = scene(GENTLE, medium=medium, resolution=(60, 50), sun={"irradiance": (1.0, 1.0, 0.5)})
+    wc.Renderer(what, method, device, threads=1)  # compiled, so that only the scene's own arrays are counted
+    reports = []
+    with wp.ScopedMemoryTracker("renderer", report_func=reports.append) as tracker:
+        tracker.clear()
+        renderer = wc.Renderer(what, method, device, threads=1)
+    plan = renderer.plan
+    expected = plan.bytes
+    if device == "cpu":
+        expected += sum(buffer.bytes for buffer in plan.buffers if buffer.name in HOST_COPIES)
+    assert expected > 40 * KILOBYTE
+    assert allocated(reports[-1], device) == pytest.approx(expected, rel=1e-3, abs=REPORT_ROUNDING)
+
+
+def test_a_plan_allocates_nothing(device):
+    reports = []
+    with wp.ScopedMemoryTracker("plan", report_func=reports.append) as tracker:
+        tracker.clear()
+        wc.make_plan(bundled("beach"), "beam", device)
+    assert allocated(reports[-1], device) == 0.0
+
+
+def test_threads_take_a_map_and_buffers_each():
+    tall = scene(GENTLE, resolution=(20, 300), size=(0.2, 3.0))
+    one, two, many = (wc.make_plan(tall, "beam", "cpu", threads) for threads in (1, 2, 99))
+    shared = sum(buffer.bytes for buffer in one.buffers if not buffer.per_lane)
+    assert two.threads == 2
+    assert two.bytes - shared == 2 * (one.bytes - shared)
+    assert many.threads == many.program.strips  # no more threads than there are strips to share out
+    assert wc.make_plan(tall, "gather", "cpu", 8).threads == 1
+    assert f"x {two.threads} threads" in str(two)
+
+
+# --- what cannot be planned -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def gigabyte(monkeypatch):
+    """A machine with a gigabyte free."""
+    monkeypatch.setattr("warp_caustics.device.free_memory", lambda device: 10**9)
+
+
+def test_a_map_that_does_not_fit_is_refused_with_its_bytes_before_anything_is_made(gigabyte, monkeypatch):
+    def too_late(*args):
+        raise AssertionError("the map should have been refused first")
+
+    monkeypatch.setattr("warp_caustics.plan.load_assets", too_late)
+    with pytest.raises(wc.InputError, match="map.resolution: 100000 x 100000 pixels.*80,000,000,000 bytes.*1,000,000,000"):
+        plan_of(scene(GENTLE, resolution=(100_000, 100_000)))
+    with pytest.raises(wc.InputError, match="160,000,000,000 bytes"):
+        plan_of(scene(GENTLE, resolution=(100_000, 100_000), sun={"irradiance": (1.0, 1.0, 1.0)}))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_buffers_that_do_not_fit_are_refused_with_their_bytes(gigabyte, method):
+    fits = scene(GENTLE, resolution=(2000, 2000), method={"gather": {"n": 3}})
+    plan = wc.make_plan(fits, method, "cpu", 1)
+    assert plan.bytes < 0.9e9
+    # The map alone would fit; what the method needs beside it does not.
+    huge = scene(
+        GENTLE, resolution=(10_000, 10_000), size=(1e3, 1e3), method={"gather": {"n": 31}, "accumulate": "float32"}
+    )
+    with pytest.raises(wc.InputError, match=rf"by method {method} take [\d,]{{11,}} bytes.*lower map.resolution"):
+        wc.make_plan(huge, method, "cpu", 64)
+
+
+def test_more_water_than_can_be_gone_through_is_refused():
+    with pytest.raises(wc.InputError, match="cells of water"):
+        plan_of(scene(GENTLE, level=1e6, size=(1e-3, 1e-3)))
+
+
+@pytest.mark.parametrize("kind", ["terrain", "mesh", "objects"])
+def test_the_gather_refuses_what_is_not_flat_and_names_who_takes_it(kind, tmp_path):
+    receiver = {
+        "terrain": {"terrain": {"base": 0.0}},
+        "mesh": {"mesh": save_quad(tmp_path)},
+        "objects": {"plane": 0.0, "objects": [{"mesh": save_box(tmp_path), "scale": 0.2}]},
+    }[kind]
+    with pytest.raises(wc.InputError) as caught:
+        plan_of(scene(GENTLE, receiver), "gather")
+    for word in ("gather", kind, '"beam"', '"photon"'):
+        assert word in str(caught.value)
+    for method in FREE_METHODS:
+        plan_of(scene(GENTLE, receiver), method)
+
+
+@pytest.mark.parametrize("accumulate", ["float64", "fixed"])
+def test_the_gather_refuses_a_format_it_cannot_honour(accumulate):
+    what = scene(GENTLE, method={"accumulate": accumulate})
+    with pytest.raises(wc.InputError, match=f'accumulate = "{accumulate}"'):
+        plan_of(what, "gather")
+    for method in FREE_METHODS:
+        assert plan_of(what, method).facts.spec.accumulate == accumulate
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"method": "beems"}, 'did you mean "beam"'),
+        ({"method": "cascaded"}, "not yet"),
+        ({"device": "cuda:99"}, "there is no 'cuda:99' here; expected one of cpu"),
+        ({"device": "gpu"}, "there is no 'gpu' here"),
+        ({"threads": 0}, "threads: expected a whole number of at least 1, got 0"),
+        ({"threads": 1.5}, "threads: expected a whole number"),
+        ({"threads": True}, "threads: expected a whole number"),
+        ({"scene": "pol"}, "pool"),
+        ({"scene": "nosuch.toml"}, "nosuch.toml"),
+    ],
+)
+def test_what_is_not_there_is_refused(changes, message):
+    with pytest.raises(wc.InputError, match=re.escape(message)):
+        wc.make_plan(**{"scene": "pool", "device": "cpu", **changes})
