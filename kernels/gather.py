@@ -55,7 +55,7 @@ def make_intersections(spec: Spec) -> wp.Kernel:
         rest = pixel
         share = float(1.0)
         if wp.static(bounded):
-            # A sample at the water's border stands for what is left of its cell, from the middle of that.
+            # A sample at the water's border stands for what is left of its cell, and still lands as a whole pixel.
             low = clip_to_water(lattice, at_rest(lattice, index, 0.0), light.rest_shift)
             high = clip_to_water(lattice, at_rest(lattice, index, 1.0), light.rest_shift)
             rest = 0.5 * (low + high)
@@ -63,7 +63,7 @@ def make_intersections(spec: Spec) -> wp.Kernel:
         water = on_water(lattice, rest, light.rest_shift)
         z = water_on_lattice(scene, column_waves, row_waves, column, row, water)
         result = photon(scene, light.direction, water, z)
-        offset = deviation(lattice, result.distance, result.direction, light.rest_shift) + rest - pixel
+        offset = deviation(lattice, result.distance, result.direction, light.rest_shift)
         bin = row * 31 + column
         flux = flux_type()
         if result.state == LANDED:
