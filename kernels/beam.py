@@ -15,7 +15,16 @@ import warp as wp
 from .deposit import ACCUMULATOR, FLUX
 from .lattice import Lattice, at_rest, clip_to_water, deviation, on_water, pixel_base, pixel_fraction, share_of_cell
 from .ledger import make_book_landed, make_count_unlanded
-from .patch import BORDER, arrived_plane, integral_weights, make_deposit_patch, plane_bend, plane_mean, thickness
+from .patch import (
+    BORDER,
+    arrived_plane,
+    integral_weights,
+    make_deposit_patch,
+    plane_bend,
+    plane_jump,
+    plane_mean,
+    thickness,
+)
 from .photon import LANDED, LANDED_ON_OBJECT, Scene, SunSample, make_photon
 from .spec import Spec
 from .wave_table import make_water_on_lattice
@@ -29,8 +38,8 @@ BEND_LEAST, BEND_MOST = 0.0005, 0.005
 FINEST = 16
 """Parts of a cell along each side at most."""
 
-TORN_BEND = 0.25
-"""Bend [pixels] past which a cell over a receiver with edges is followed ray by ray instead of interpolated."""
+TORN = 0.25
+"""Bend or jump [pixels] past which a cell over a receiver with edges is followed ray by ray instead of interpolated."""
 
 
 @functools.cache
@@ -158,8 +167,10 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
                 left = wp.clamp(wp.static(BEND_SHARE) * thick, wp.static(BEND_LEAST), wp.static(BEND_MOST))
                 n = wp.clamp(int(wp.ceil(wp.sqrt(bend / left))), 1, wp.static(FINEST))
             if wp.static(edges):
-                if bend > wp.static(TORN_BEND):
-                    common = int(0)
+                if whole == 1 and common != 0:
+                    jump = wp.max(plane_jump(planes, 0, row, column), plane_jump(planes, 1, row, column))
+                    if wp.max(bend, jump) > wp.static(TORN):
+                        common = int(0)
         if wp.static(breaks):
             torn_cells_out[row, column] = wp.uint8(wp.where(common == 0, 1, 0))
         bin = row * 31 + column

@@ -132,6 +132,8 @@ def make_deposit_triangle(accumulate: str, channels: int) -> wp.Function:
     def deposit_triangle(
         map: wp.array[dtype], size: wp.vec2i, base: wp.vec2i, a: wp.vec2, b: wp.vec2, c: wp.vec2, flux: FLUX[channels]
     ) -> float:
+        if not wp.isfinite(a[0] + a[1] + b[0] + b[1] + c[0] + c[1]):
+            return 0.0
         low_x = wp.min(a[0], wp.min(b[0], c[0]))
         high_x = wp.max(a[0], wp.max(b[0], c[0]))
         low_y = wp.min(a[1], wp.min(b[1], c[1]))

@@ -118,6 +118,31 @@ def plane_bend(planes: wp.array3d[float], plane: int, row: int, column: int) -> 
 
 
 @wp.func
+def jump_between(a: float, b: float, c: float, d: float) -> float:
+    """How far the middle two of four values are apart beyond what their neighbours' differences lead to expect."""
+    return wp.abs(c - b - 0.5 * (b - a + d - c))
+
+
+@wp.func
+def plane_jump(planes: wp.array3d[float], plane: int, row: int, column: int) -> float:
+    """How far a plane jumps within a cell: a step between its own corners has no second difference, but this."""
+    worst = float(0.0)
+    for i in range(1, 3):
+        a = stencil_row(planes, plane, row + i, column)
+        worst = wp.max(worst, jump_between(a[0], a[1], a[2], a[3]))
+        worst = wp.max(
+            worst,
+            jump_between(
+                planes[plane, row, column + i],
+                planes[plane, row + 1, column + i],
+                planes[plane, row + 2, column + i],
+                planes[plane, row + 3, column + i],
+            ),
+        )
+    return worst
+
+
+@wp.func
 def thickness(planes: wp.array3d[float], row: int, column: int, side: wp.vec2) -> float:
     """Width of a landed cell across its longer diagonal [pixels]; nothing at a focus, where it is a sliver."""
     a = wp.vec2(planes[0, row + 1, column + 1], planes[1, row + 1, column + 1])

@@ -7,6 +7,13 @@ import warp as wp
 from .coverage import make_deposit_point
 from .deposit import ACCUMULATOR, FLUX, make_add
 
+NARROWEST = 1.0e-2
+"""Width [pixels] up to which a box is a point: its sides would be known to no more than a few digits in float32."""
+
+
+FARTHEST = 1.0e9
+"""Distance [pixels] past which nothing is near a map, and within which an integer holds it."""
+
 
 @functools.cache
 def make_deposit_box(accumulate: str, channels: int) -> wp.Function:
@@ -22,8 +29,13 @@ def make_deposit_box(accumulate: str, channels: int) -> wp.Function:
     def deposit_box(
         map: wp.array[dtype], size: wp.vec2i, base: wp.vec2i, p: wp.vec2, width: wp.vec2, flux: FLUX[channels]
     ) -> float:
-        if width[0] <= 0.0 or width[1] <= 0.0:
+        if not (width[0] > wp.static(NARROWEST) and width[1] > wp.static(NARROWEST)):
             return deposit_point(map, size, base, p, flux, 1.0)
+        if not (wp.abs(p[0]) < wp.static(FARTHEST) and wp.abs(p[1]) < wp.static(FARTHEST)):
+            return 0.0
+        # From the pixel that it falls in, so that its sides keep their digits wherever it lands.
+        base = base + wp.vec2i(int(wp.floor(p[0])), int(wp.floor(p[1])))
+        p = p - wp.vec2(wp.floor(p[0]), wp.floor(p[1]))
         left = float(-base[0])
         bottom = float(-base[1])
         right = left + float(size[0])

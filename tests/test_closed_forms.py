@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracle import first_focus_depth, sine_folds, sine_irradiance, sine_landing
+from oracle.cases import sunlight
 from scenery import METHODS, relative_l2, render, sample_points, save_heights, scene, wave
 
 # Relative L2 error over a wave of 96 pixels. The beam lets 0.005 of a pixel's bend stand, so a pixel is right to a
@@ -142,3 +143,19 @@ def test_a_lens_of_water_focuses(device, method, tmp_path):
     middle = far.caustic_map[9:12, 9:12].sum(dtype=np.float64) * pixel**2
     assert middle == pytest.approx(area, rel=1e-3)
     assert far.caustic_map[10, 10] > 0.5 * area / pixel**2
+
+
+@pytest.mark.parametrize(("zenith", "share"), [(0.0, 1.0), (20.0, 1.024), (30.0, 1.06), (45.0, 1.17), (60.0, 1.43)])
+def test_the_light_of_eq_3_3_lands_too_far_by_its_printed_share(device, zenith, share, tmp_path):
+    # Flat water from a file lights a square of the floor, whose middle tells how far its light went sideways.
+    flat = save_heights(tmp_path, "flat", np.zeros((9, 9)), (-0.5, -0.5), (1.0, 1.0))
+    what = scene(
+        height_map=flat, direction=sunlight(zenith, 0.0), medium={"ior": IOR}, origin=(-1.0, -1.0), size=(4.0, 2.0),
+        resolution=(80, 40), method={"photon": {"projection": "backlund"}},
+    )  # fmt: skip
+    image = render(what, "photon", device).caustic_map
+    x, y = sample_points(image.shape, what.map.origin, what.map.size)
+    inside = np.sin(np.radians(zenith)) / IOR
+    exactly = inside / np.sqrt(1.0 - inside**2)
+    assert (image * x).sum() / image.sum() == pytest.approx(share * exactly, abs=5e-3)
+    assert (image * y).sum() / image.sum() == pytest.approx(0.0, abs=1e-4)

@@ -7,7 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from oracle.cases import CASES, sunlight
-from scenery import FREE_METHODS, METHODS, bundled, render, scene, wave
+from scenery import (
+    FREE_METHODS,
+    METHODS,
+    bundled,
+    render,
+    sample_points,
+    save_box,
+    save_heights,
+    scene,
+    sum_of_waves,
+    wave,
+)
 
 import warp_caustics as wc
 
@@ -19,6 +30,7 @@ PHASES = 16  # frames over a period: their mean holds no first to fifteenth harm
 SHADOW_EDGES = {"beam": 1e-4, "photon": 1e-2, "gather": 4e-2}
 # 16 frames see the ends of the window, where a shadow's edge is a cell wide, at 16 places only.
 FRAME_EDGES = {"beam": 2e-3, "photon": 5e-3, "gather": 5e-3}
+HUMP = 1e-3  # a gather's samples stand 5 cm apart on a hump of 60
 PRINTED = 6e-3  # factors printed to three digits, at 64 samples a wave that a low sun lights over a fifth
 STEEP_FACTORS = {60.0: 1.06, 70.0: 1.27, 80.0: 1.98, 85.0: 3.43}  # physics.md, for a sine of slope 0.8
 OVER_LIT_WARNING = "enters twice"
@@ -207,6 +219,64 @@ def test_what_crests_take_is_what_they_would_have_lit_twice(device, method):
         assert sums[self_shadow]["emitted"] - spare == pytest.approx(through, rel=tolerance)
     assert sums[True]["emitted"] == pytest.approx(sums[False]["emitted"], rel=LEDGER_OF_CELLS)
     assert sums[True]["blocked"] == pytest.approx(sums[False]["over_lit"], rel=FRAME_EDGES[method])
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("self_shadow", [True, False])
+def test_a_hump_of_water_from_a_file_takes_no_more_than_comes(device, method, self_shadow, tmp_path):
+    # A hump that is level at its border: through two metres by two comes |I_z| E, less what its neighbours shade.
+    if method == "beam" and not self_shadow:
+        pytest.skip("the waves above show it, and this would compile three kernels more")
+    corner, size, zenith = (-1.0, -1.0), (2.0, 2.0), 75.0
+    x, y = sample_points((64, 64), corner, size)
+    hump = 0.2 * (1.0 - np.minimum((x**2 + y**2) / 0.6**2, 1.0)) ** 3
+    what = scene(
+        height_map=save_heights(tmp_path, "hump", hump, corner, size), direction=sunlight(zenith, 20.0), level=0.5,
+        origin=(-2.0, -2.0), size=(6.0, 6.0), resolution=(120, 120), self_shadow=self_shadow,
+    )  # fmt: skip
+    result = render(what, method, device)
+    assert_adds_up(result)
+    energy = result.energy
+    assert energy.outside_map < LEDGER * energy.emitted
+    spare = energy.blocked if self_shadow else energy.over_lit
+    assert spare > 0.02
+    through = 4.0 * np.cos(np.radians(zenith))
+    assert energy.emitted - energy.missed_by_window - spare == pytest.approx(through, rel=HUMP)
+    assert energy.received == pytest.approx(through + (0.0 if self_shadow else spare), rel=HUMP)
+
+
+@pytest.mark.parametrize("method", FREE_METHODS)
+def test_everything_at_once_adds_up(device, method, tmp_path):
+    """Water and bed from files, a shore, a rock under water and one above, every loss by colour, a wide sun."""
+    corner, size = (-1.0, -1.0), (5.0, 5.0)
+    x, y = sample_points((120, 120), corner, size)
+    swell = sum_of_waves([wave(0.1, 6.0, 2.0), wave(0.05, -5.0, 7.0)], x, y)
+    bed = 0.5 + 0.3 * x - 0.1 * y + sum_of_waves([wave(0.08, 5.0, 3.0)], x, y)
+    box = save_box(tmp_path)
+    what = scene(
+        None,
+        {
+            "terrain": save_heights(tmp_path, "bed", bed, corner, size),
+            "objects": [
+                {"mesh": box, "translate": (0.7, 0.5, 0.5), "scale": 0.25},
+                {"mesh": box, "translate": (1.2, 0.5, 0.4), "scale": 0.9},
+            ],
+        },
+        sunlight(65.0, 200.0),
+        {"ior": 1.34, "fresnel": True, "absorption": (0.4, 0.1, 0.02)},
+        height_map=save_heights(tmp_path, "swell", swell, corner, size),
+        sun={"irradiance": (900.0, 1000.0, 800.0), "angular_diameter": 2.0},
+        method={"accumulate": "fixed"},
+        size=(2.0, 1.2),
+        resolution=(48, 30),
+    )
+    result = render(what, method, device)
+    left_out = {reason.what for reason in result.plan.facts.reasons if not reason.kept}
+    assert left_out == {"camera"}
+    assert_adds_up(result)
+    assert np.isfinite(result.caustic_map).all()
+    for name in ("received", "reflected", "absorbed", "blocked", "dry"):
+        assert np.min(result.energy[name]) > 0.0, name
 
 
 def test_calm_water_needs_no_shadows_and_lights_nothing_twice(device):

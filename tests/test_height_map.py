@@ -274,9 +274,8 @@ def over_grid(grid):
     return water, terrain
 
 
-BUG = pytest.mark.xfail(strict=True, reason="BUG: bounds of a height map are taken at its nodes and passed between")
 ROUGH = ["four nodes a wave", "cliff", "two nodes a wave", "one pillar", "noise"]
-KINDS = ["smooth", *(pytest.param(kind, marks=BUG) for kind in ROUGH)]
+KINDS = ["smooth", *ROUGH]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -207,7 +207,6 @@ def test_fixed_point_does_not_depend_on_the_device(device):
 NARROW = [1e-2, 1e-3, 1e-4, 1e-6, 1e-8]
 
 
-@pytest.mark.xfail(strict=True, reason="BUG: a box about as narrow as a coordinate's last digit gains or loses flux")
 @pytest.mark.parametrize("width", NARROW)
 def test_a_narrow_box_keeps_its_flux(device, width):
     """A footprint is any number: as it narrows, a box becomes a point, whose flux is all there."""

@@ -133,12 +133,6 @@ def test_torn_cells_follow_the_curvature_of_waves(device, box_file):
     assert entries["emitted"] * PIXEL**2 == pytest.approx(beam.energy.emitted, rel=1e-4)
 
 
-BUG = pytest.mark.xfail(
-    strict=True, reason="BUG: a jump of the landing within one cell is not seen, and smeared over it"
-)
-
-
-@BUG
 @pytest.mark.parametrize("turn", [0.0, 90.0])
 def test_a_cliff_of_a_mesh_leaves_no_streak(device, tmp_path, turn):
     """A terrace that drops from 0.3 m to the floor, away from the sun, along either axis: all one mesh."""
@@ -171,7 +165,6 @@ def test_a_cliff_of_a_mesh_leaves_no_streak(device, tmp_path, turn):
     assert (image[:, pixels(rim, behind)] == 0.0).all()
 
 
-@BUG
 def test_light_lands_only_where_rays_land_behind_a_hill(device):
     """A sharp ridge in closed form: the shadow behind it, found by rays in float64, stays dark to the last pixel."""
     ridge = {"amplitude": 0.25, "wavevector": (2.0 * np.pi, 0.0), "phase": np.pi / 2.0}

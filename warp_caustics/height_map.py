@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,8 +12,21 @@ if TYPE_CHECKING:
 
     from .assets import HeightGrid
 
-OVERSHOOT = 1.25
-"""A cubic between nodes can be steeper than at any node; for fourth-order slopes a quarter more is never passed."""
+BOUND_ROWS = 256
+"""Rows of patches whose control points are made at a time, so that a large map's bounds take little memory."""
+
+
+ROUNDING = 1e-6
+"""Share by which bounds are widened for float32, in which the kernels work."""
+
+
+@dataclass(frozen=True)
+class Hull:
+    """Bounds of a height map's surface, nodes and all between them."""
+
+    lowest: float
+    highest: float
+    slope: float
 
 
 def difference(z: np.ndarray, axis: int) -> np.ndarray:
@@ -53,10 +67,59 @@ def node_spacing(grid: HeightGrid) -> np.ndarray:
     return np.array([grid.size[0] / columns, grid.size[1] / rows])
 
 
-def node_slopes(grid: HeightGrid) -> np.ndarray:
-    """Slopes at the nodes, ``[rows * columns, 2]``."""
-    spacing = node_spacing(grid)
-    return np.stack([difference(grid.z, 1) / spacing[0], difference(grid.z, 0) / spacing[1]], axis=-1).reshape(-1, 2)
+def surface_hull(grid: HeightGrid) -> Hull:
+    """Bound the surface between the nodes: a patch lies in the hull of its Bézier control points, its slope in theirs.
+
+    The control points of a cubic are (z0, z0 + m0/3, z1 - m1/3, z1), those of its slope three times their
+    differences. The outer patches reach half a node further, to the map's border.
+    """
+    nodes, spacing = hermite_nodes(grid.z), node_spacing(grid)
+    lowest, highest, slope = np.inf, -np.inf, 0.0
+    for first in range(0, len(nodes) - 1, BOUND_ROWS):
+        control = _control_points(nodes[first : first + BOUND_ROWS + 1])
+        wide, tall = np.ones(control.shape[3]), np.ones((control.shape[2], 1))
+        _reach_border(control, 1, (..., 0), (..., -1), wide)
+        upto = first + BOUND_ROWS >= len(nodes) - 1
+        _reach_border(control, 0, (..., 0, slice(None)) if first == 0 else None,
+                      (..., -1, slice(None)) if upto else None, tall)  # fmt: skip
+        along = 3.0 * np.abs(np.diff(control, axis=1)).max(axis=(0, 1)) / wide / spacing[0]
+        across = 3.0 * np.abs(np.diff(control, axis=0)).max(axis=(0, 1)) / tall / spacing[1]
+        slope = max(slope, float(np.hypot(along, across).max()))
+        lowest, highest = min(lowest, float(control.min())), max(highest, float(control.max()))
+    spare = ROUNDING * max(abs(lowest), abs(highest), 1.0)
+    return Hull(lowest - spare, highest + spare, slope * (1.0 + ROUNDING))
+
+
+def _reach_border(control: np.ndarray, axis: int, first: Any, last: Any, width: np.ndarray) -> None:
+    """Stretch the outer patches along an axis by half a node, in place; ``width`` [nodes] follows."""
+    for at, start, end, index in ((first, -0.5, 1.0, 0), (last, 0.0, 1.5, -1)):
+        if at is not None:
+            weights = np.array(
+                [_blossom(u) for u in ((start,) * 3, (start, start, end), (start, end, end), (end,) * 3)]
+            )
+            patches = np.moveaxis(control[at], axis, 0)
+            control[at] = np.moveaxis(np.tensordot(weights, patches, 1), 0, axis)
+            width[index] = end - start
+
+
+def _blossom(u: tuple[float, float, float]) -> np.ndarray:
+    """Weights of a cubic's control points in its polar form at three parameters (de Casteljau)."""
+    points = np.eye(4)
+    for t in u:
+        points = (1.0 - t) * points[:-1] + t * points[1:]
+    return points[0]
+
+
+def _control_points(nodes: np.ndarray) -> np.ndarray:
+    """Control points ``[4 along y, 4 along x, rows - 1, columns - 1]`` of the patches between nodes."""
+    control = np.empty((4, 4, nodes.shape[0] - 1, nodes.shape[1] - 1))
+    for j, (row, up) in enumerate(((0, 0.0), (0, 1.0), (1, -1.0), (1, 0.0))):
+        for i, (column, right) in enumerate(((0, 0.0), (0, 1.0), (1, -1.0), (1, 0.0))):
+            z, zu, zv, zuv = np.moveaxis(
+                nodes[row : nodes.shape[0] - 1 + row, column : nodes.shape[1] - 1 + column], -1, 0
+            )
+            control[j, i] = z + right * zu / 3.0 + up * zv / 3.0 + right * up * zuv / 9.0
+    return control
 
 
 def sample_heights(grid: HeightGrid, x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -87,5 +150,6 @@ def covers(grid: HeightGrid, origin: Sequence[float], size: Sequence[float]) -> 
 
 
 def _hermite(t: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Weights of (value 0, value 1, slope 0, slope 1), as in ``kernels/grid.py``."""
     s = 1.0 - t
     return s * s * (1.0 + 2.0 * t), t * t * (3.0 - 2.0 * t), t * s * s, -t * t * s

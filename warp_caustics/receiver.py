@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .errors import InputError
-from .height_map import OVERSHOOT, covers, node_slopes, sample_heights
+from .height_map import covers, sample_heights, surface_hull
 from .scene import ClosedTerrain
 
 if TYPE_CHECKING:
@@ -101,10 +101,8 @@ def receiver_bounds(scene: Scene, assets: Assets, low: np.ndarray, high: np.ndar
         return Bounds(float(z.min()), float(z.max()), np.inf)
     if kind == "grid":
         assert assets.terrain is not None
-        z = assets.terrain.z
-        steepest = OVERSHOOT * np.linalg.norm(node_slopes(assets.terrain), axis=1).max()
-        spare = (OVERSHOOT - 1.0) * 0.5 * (z.max() - z.min())
-        return Bounds(float(z.min() - spare), float(z.max() + spare), float(steepest))
+        hull = surface_hull(assets.terrain)
+        return Bounds(hull.lowest, hull.highest, hull.slope)
     terrain = closed_terrain(scene)
     corners = [
         terrain.base + terrain.slope[0] * x + terrain.slope[1] * y for x in (low[0], high[0]) for y in (low[1], high[1])

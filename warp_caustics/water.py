@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .height_map import OVERSHOOT, node_slopes, sample_heights
+from .errors import InputError
+from .height_map import sample_heights, surface_hull
 
 if TYPE_CHECKING:
     from .assets import Assets
@@ -15,11 +16,17 @@ if TYPE_CHECKING:
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
 
-ZONOTOPE_DIRECTIONS = 64
-"""Directions in which the set of slopes is taken at its farthest; it bulges between them by 1 / cos(pi / 64)."""
+DISK_DIRECTIONS = 64
+"""Directions in which a disk of slopes is tried; it is drawn around, not inside, so that it holds them all."""
+
+EDGE_POINTS = 8
+"""Points along each edge of the set of slopes at which refraction is tried."""
 
 RADII = np.linspace(0.0, 1.0, 9)
 """Where, from no slope to the farthest, refraction is tried for its bounds."""
+
+LONGEST_TIME = 1e9
+"""Latest time [s], 32 years, at which a phase of float64 is still right to 1e-6 rad."""
 
 
 def angular_frequency(wavenumber: np.ndarray, depth: float) -> np.ndarray:
@@ -44,7 +51,14 @@ def phases(scene: Scene, time: float, depth: float) -> np.ndarray:
     """Phase of each wave at the map's origin at a time, reduced to [0, 2 pi) [rad].
 
     Taken in float64, so that neither a distant map nor a late time costs the kernels a digit.
+
+    Raises
+    ------
+    InputError
+        If the time is not finite, or so late that a phase is not known.
     """
+    if not abs(time) <= LONGEST_TIME:
+        raise InputError(f"time: expected a number of seconds up to {LONGEST_TIME:g} either way, got {time}")
     waves = scene.water.waves or ()
     k = np.array([wave.wavevector for wave in waves], dtype=np.float64).reshape(-1, 2)
     given = [wave.angular_frequency for wave in waves]
@@ -58,25 +72,36 @@ def phases(scene: Scene, time: float, depth: float) -> np.ndarray:
 def extreme_slopes(scene: Scene, assets: Assets) -> np.ndarray:
     """Points ``[n, 2]`` whose convex hull holds every slope that the surface can have, zero among them.
 
-    For waves the slopes fill a zonotope, the sum of the segments from -a k to a k; for a height map those of its
-    nodes, with :data:`~.height_map.OVERSHOOT`, as a disk.
+    For waves the slopes fill a zonotope, the sum of the segments from -a k to a k; for a height map they are bounded
+    by a disk.
     """
-    angle = np.linspace(0.0, 2.0 * np.pi, ZONOTOPE_DIRECTIONS, endpoint=False)
-    outward = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     if assets.water is not None:
-        steepest = OVERSHOOT * np.linalg.norm(node_slopes(assets.water), axis=1).max()
-        rim = outward * steepest / np.cos(np.pi / ZONOTOPE_DIRECTIONS)
+        angle = np.linspace(0.0, 2.0 * np.pi, DISK_DIRECTIONS, endpoint=False)
+        steepest = surface_hull(assets.water).slope / np.cos(np.pi / DISK_DIRECTIONS)
+        rim = steepest * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     else:
         steps = np.array([np.multiply(wave.amplitude, wave.wavevector) for wave in scene.water.waves or ()])
-        steps = steps.reshape(-1, 2)
-        rim = np.sign(outward @ steps.T) @ steps
-    return (RADII[:, None, None] * rim).reshape(-1, 2)
+        rim = zonotope(steps.reshape(-1, 2))
+    share = np.arange(EDGE_POINTS)[:, None, None] / EDGE_POINTS
+    outline = ((1.0 - share) * rim + share * np.roll(rim, -1, axis=0)).reshape(-1, 2)
+    return (RADII[:, None, None] * outline).reshape(-1, 2)
+
+
+def zonotope(steps: np.ndarray) -> np.ndarray:
+    """Corners, in order, of the sum of the segments from -step to step, for steps ``[n, 2]``."""
+    if not len(steps):
+        return np.zeros((1, 2))
+    upper = np.where((steps[:, 1] < 0.0) | ((steps[:, 1] == 0.0) & (steps[:, 0] < 0.0)), -1.0, 1.0)[:, None] * steps
+    upper = upper[np.argsort(np.arctan2(upper[:, 1], upper[:, 0]))]
+    half = -upper.sum(axis=0) + np.concatenate([np.zeros((1, 2)), 2.0 * np.cumsum(upper, axis=0)])
+    return np.concatenate([half[:-1], -half[:-1]])
 
 
 def amplitude_bound(scene: Scene, assets: Assets) -> float:
     """Largest displacement from the rest level, either way [m]."""
     if assets.water is not None:
-        return float(OVERSHOOT * np.abs(assets.water.z).max())
+        hull = surface_hull(assets.water)
+        return max(abs(hull.lowest), abs(hull.highest))
     return float(sum(abs(wave.amplitude) for wave in scene.water.waves or ()))
 
 

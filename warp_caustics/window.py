@@ -13,8 +13,13 @@ from .sun import refract_slopes
 STEEPEST_RAY = 20.0
 """Tangent of the flattest refracted ray that the window is made for (87 degrees from the vertical)."""
 
-MOST_CELLS = 2**36
-"""Cells of a lattice at most: beyond it a frame takes hours, and indices leave what float32 counts by rows."""
+MARGIN = 0.02
+"""Share by which bounds are widened: refraction is tried at points of the set of slopes, and bends between them."""
+
+TOO_FAR = "light spreads far for pixels this small: make them larger, or the water shallower or calmer"
+
+MOST_CELLS = 2**33
+"""Cells in a frame at most, all directions of the sun together: a core goes through them in a day."""
 
 INDEX_BOUND = 2**24
 """Rows or columns at most: float32 counts whole numbers up to here."""
@@ -64,24 +69,33 @@ class Lattice:
 def refraction_reach(direction: np.ndarray, slopes: np.ndarray, ior: float) -> Reach:
     """Bounds of the refracted rays from a surface whose slopes ``[n, 2]`` are given, where it faces the sun."""
     rest = refract_slopes(direction, np.zeros((1, 2)), ior)[0]
-    rays = refract_slopes(direction, slopes, ior)
-    lit = slopes @ direction[:2] - direction[2] > 0.0
-    rays = np.concatenate([rest[None, :], rays[lit]])
+    # A slope that faces away counts as the one on its way there that the light just grazes.
+    towards = slopes @ direction[:2]
+    faces_away = towards < direction[2]
+    share = np.where(faces_away, direction[2] / np.where(faces_away, towards, 1.0), 1.0)
+    rays = np.concatenate([rest[None, :], refract_slopes(direction, share[:, None] * slopes, ior)])
     across = np.linalg.norm(rays[:, :2], axis=1)
-    down = np.maximum(-rays[:, 2], across / STEEPEST_RAY)
-    down = np.maximum(down, np.finfo(np.float64).tiny)
+    # A sun so low, through water that hardly bends, that even light at rest is flatter sets its own limit.
+    flattest = max(STEEPEST_RAY, 2.0 * across[0] / -rays[0, 2])
+    down = np.maximum(np.maximum(-rays[:, 2], across / flattest), np.finfo(np.float64).tiny)
     way = rays[:, :2] / down[:, None]
     steepest = np.linalg.norm(way, axis=1).max()
     by_backlund = rays[:, :2] * (rays @ direction / -direction[2])[:, None]
     return Reach(
         rest=-rest[:2] / rest[2],
-        low=way.min(axis=0),
-        high=way.max(axis=0),
-        backlund_low=by_backlund.min(axis=0),
-        backlund_high=by_backlund.max(axis=0),
-        steepest=float(steepest),
+        low=_widened(way, -1.0),
+        high=_widened(way, 1.0),
+        backlund_low=_widened(by_backlund, -1.0),
+        backlund_high=_widened(by_backlund, 1.0),
+        steepest=min(float(steepest * (1.0 + MARGIN)), flattest) if len(slopes) > 1 else float(steepest),
         clipped=bool((down > -rays[:, 2]).any()),
     )
+
+
+def _widened(way: np.ndarray, side: float) -> np.ndarray:
+    """The bound of ``way`` on one side, widened by a share of its spread."""
+    low, high = way.min(axis=0), way.max(axis=0)
+    return np.asarray((high if side > 0.0 else low) + side * MARGIN * (high - low))
 
 
 def deviation_bounds(
@@ -121,7 +135,6 @@ def lattice_over(low: np.ndarray, high: np.ndarray, resolution: tuple[int, int],
     count = last - first
     if not np.isfinite(count).all() or np.abs([first, last]).max() > INDEX_BOUND or count.prod() > MOST_CELLS:
         raise InputError(
-            f"map: lighting it takes {count[0]:.3g} x {count[1]:.3g} cells of water, more than can be gone through; "
-            "light spreads too far for pixels this small: make the pixels larger, the water shallower or calmer"
+            f"map: it takes {count[0]:.3g} x {count[1]:.3g} cells of water, too many to go through; {TOO_FAR}"
         )
     return Lattice((int(first[0]), int(first[1])), (int(count[0]), int(count[1])), step)
