@@ -73,7 +73,7 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
         map_out: wp.array[float],
         dry_out: wp.array[wp.float64],
     ):
-        """One thread a pixel; launch dims (rows, columns)."""
+        """One thread a pixel; launch dims (rows, columns); ``irradiance`` is that of one direction of the sun."""
         row, column = wp.tid()
         middle = wp.vec2((float(column) + 0.5) * pixel[0], (float(row) + 0.5) * pixel[1])
         # Most pixels are wholly wet or wholly dry by a margin; only the others are looked at in parts.
@@ -95,7 +95,7 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
                     for k in range(suns.shape[0]):
                         sun = suns[k].direction
                         light += dry * wp.max(0.0, facing(sun, wp.vec2(ground[1], ground[2])))
-        light /= float(suns.shape[0]) * float(wp.static(DRY_PARTS)) * float(wp.static(DRY_PARTS))
+        light /= float(wp.static(DRY_PARTS)) * float(wp.static(DRY_PARTS))
         if light > 0.0:
             for c in range(colours):
                 at = (row * columns + column) * colours + c

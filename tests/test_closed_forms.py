@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenery import METHODS, relative_l2, render, sample_points, save_heights, scene, wave
+
 from oracle import first_focus_depth, sine_folds, sine_irradiance, sine_landing
 from oracle.cases import sunlight
-from scenery import METHODS, relative_l2, render, sample_points, save_heights, scene, wave
 
 # Relative L2 error over a wave of 96 pixels. The beam lets 0.005 of a pixel's bend stand, so a pixel is right to a
 # thousandth; beside a fold one pixel holds what rises as 1/sqrt(distance). A box of a pixel blurs by a pixel: 16

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracle.cases import CASES, sunlight
 from scenery import (
     FREE_METHODS,
     METHODS,
@@ -21,6 +20,7 @@ from scenery import (
 )
 
 import warp_caustics as wc
+from oracle.cases import CASES, sunlight
 
 EXACT = 1e-5  # what the issue asks on planes: float32 sums of some hundred cells a pixel
 LEDGER = 1e-6  # a float32 map against a float64 ledger
@@ -35,6 +35,7 @@ PRINTED = 6e-3  # factors printed to three digits, at 64 samples a wave that a l
 STEEP_FACTORS = {60.0: 1.06, 70.0: 1.27, 80.0: 1.98, 85.0: 3.43}  # physics.md, for a sine of slope 0.8
 OVER_LIT_WARNING = "enters twice"
 
+TELLING = {"shore": "dry", "hills": "outside_map", "leaving": "left_water", "shaded": "blocked"}
 LOSSES = ("received", "reflected", "absorbed", "outside_map", "left_water", "blocked", "missed_by_window", "dropped")
 
 
@@ -68,9 +69,7 @@ def periodic_waves(size, slope, turns=((1, 0), (0, 2), (2, -1), (-1, 3))):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("zenith", [0.0, 35.0, 70.0])
-@pytest.mark.parametrize(
-    ("resolution", "size"), [((32, 32), (1.0, 1.0)), ((24, 36), (1.2, 1.0)), ((7, 5), (0.3, 0.2))]
-)
+@pytest.mark.parametrize(("resolution", "size"), [((32, 32), (1.0, 1.0)), ((24, 36), (1.2, 1.0)), ((7, 5), (0.3, 0.2))])
 def test_a_whole_period_receives_what_flat_water_would(device, method, zenith, resolution, size):
     for slope in (0.01, 0.05):
         what = scene(
@@ -147,8 +146,7 @@ def test_hard_cases_add_up(device, name, method):
     case = replace(CASES[name], resolution=(32, 24))
     result = render(wc.Scene(**case.scene_dict()), method, device)
     assert_adds_up(result)
-    telling = {"shore": "dry", "hills": "outside_map", "leaving": "left_water", "shaded": "blocked"}.get(name, "absorbed")
-    assert np.min(result.energy[telling]) > 0.0, "the case does not show what it is there for"
+    assert np.min(result.energy[TELLING.get(name, "absorbed")]) > 0.0, "the case does not show what it is there for"
 
 
 @pytest.mark.parametrize("method", FREE_METHODS)
@@ -281,7 +279,8 @@ def test_everything_at_once_adds_up(device, method, tmp_path):
 
 def test_calm_water_needs_no_shadows_and_lights_nothing_twice(device):
     for self_shadow in (False, True, "auto"):
-        result = render(scene([wave(0.01, 2.0, 0.0)], direction=sunlight(60.0), self_shadow=self_shadow), "photon", device)
+        calm = scene([wave(0.01, 2.0, 0.0)], direction=sunlight(60.0), self_shadow=self_shadow)
+        result = render(calm, "photon", device)
         assert not result.plan.facts.spec.self_shadow
         assert result.energy.over_lit == 0.0
         assert result.warnings == []

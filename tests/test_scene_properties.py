@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from oracle.cases import sunlight
 from scenery import FREE_METHODS, METHODS, render, scene, tables, wave
 
 import warp_caustics as wc
+from oracle.cases import sunlight
 
 LEDGER = 1e-5
 ROUNDING = 1e-6  # of the largest entry, below which a negative number is a rounding of nothing
@@ -47,7 +47,8 @@ def waters(draw, place, steepest):
         k = 2.0 * np.pi / (pixel * SAMPLES_A_WAVE * 10.0 ** (1.5 * draw(share)))
         heading = draw(angle)
         amplitude = steepest / count / k * draw(st.sampled_from([1.0, -1.0, 0.3]))
-        made.append(wave(amplitude, k * np.cos(heading), k * np.sin(heading), LARGEST_PHASE * (2.0 * draw(share) - 1.0)))
+        phase = LARGEST_PHASE * (2.0 * draw(share) - 1.0)
+        made.append(wave(amplitude, k * np.cos(heading), k * np.sin(heading), phase))
     return made
 
 

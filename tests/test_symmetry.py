@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracle.cases import CASES
 from scenery import (
     FREE_METHODS,
     GENTLE,
@@ -23,6 +22,7 @@ from scenery import (
 )
 
 import warp_caustics as wc
+from oracle.cases import CASES
 
 ROUNDING = 2e-5  # float32 landings, marches and sums, taken in another order
 # A beam's cells are cut along one diagonal. A mirror lays it the other way, and a map is only right to its own error.

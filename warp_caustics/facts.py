@@ -61,6 +61,11 @@ class Facts:
     warnings: tuple[str, ...] = field(default=())
 
     @property
+    def sun_share(self) -> float:
+        """Irradiance of one direction of the sun, where the whole disk gives 1 on a plane that faces its middle."""
+        return float(1.0 / (self.suns @ self.scene.sun.unit_direction).sum())
+
+    @property
     def waves(self) -> int:
         """Count of the water's waves."""
         return len(self.scene.water.waves or ())
@@ -97,6 +102,8 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     anywhere = (0.0, max(0.0, -wide.lowest) + amplitude)
     by_backlund = _deviation([((r.backlund_low, r.backlund_high), r.rest) for r in reaches], anywhere, reference, pixel)
     spec, reasons = _specify(scene, assets, suns, slopes, amplitude, reaches, wide)
+    if spec.occluders:
+        warnings.append("receiver: a mesh rises above the water; it shades the water, and its dry part is not lit")
     return Facts(
         scene=scene,
         assets=assets,
@@ -165,7 +172,7 @@ def _ground(scene: Scene, assets: Assets, amplitude: float, steepest: float) -> 
     low = np.asarray(scene.map.origin, dtype=np.float64)
     high = low + np.asarray(scene.map.size)
     over_map = receiver_bounds(scene, assets, low, high)
-    pad = steepest * (scene.water.level - over_map.lowest + amplitude)
+    pad = steepest * max(scene.water.level - over_map.lowest + amplitude, 0.0)
     wide = receiver_bounds(scene, assets, low - pad, high + pad)
     bounds = [replace(b, lowest=b.lowest - scene.water.level, highest=b.highest - scene.water.level)
               for b in (over_map, wide)]  # fmt: skip

@@ -36,7 +36,7 @@ def read_energy(plan: Plan, ledgers: np.ndarray, caustic_map: np.ndarray, dry: n
     facts, lattice = plan.facts, plan.program.lattice
     colours = len(facts.irradiance)
     pixel_area = float(np.prod(facts.pixel))
-    cell = lattice.step**2 * pixel_area / len(facts.suns) * np.asarray(facts.irradiance)
+    cell = lattice.step**2 * pixel_area * facts.sun_share * np.asarray(facts.irradiance)
     sums = ledgers.sum(axis=(0, 2)).reshape(len(ENTRIES), -1) * np.ones((1, colours)) * cell
     entries = dict(zip(ENTRIES, sums, strict=True))
     landed = caustic_map.reshape(-1, colours).sum(axis=0, dtype=np.float64) * pixel_area
@@ -63,7 +63,7 @@ def _beyond_border(facts: Facts) -> float:
         inside = np.minimum(high + shift, facts.scene.map.size) - np.maximum(low + shift, 0.0)
         missing = np.prod(facts.scene.map.size) - np.prod(np.maximum(inside, 0.0))
         total += -sun[2] * max(float(missing), 0.0)
-    return total / len(facts.suns)
+    return total * facts.sun_share
 
 
 def _plain(value: np.ndarray) -> float | np.ndarray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from .assets import load_assets
@@ -14,12 +14,22 @@ from .kernels.ledger import BINS, ENTRIES
 from .methods import METHODS
 from .program import Buffer, Program
 from .scene import Scene, known_method, load_scene
+from .window import TOO_FAR
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 WAVE_BYTES, SUN_BYTES = 16, 20
 """Bytes of a wave and of a direction of the sun on the device."""
+
+MOST_VALUES = 2**31 - 1
+"""Values of one array at most, in Warp."""
+
+MOST_WORK = 2**33
+"""Cells in a frame at most, all directions of the sun together: a core goes through them in a day."""
+
+LONG_WORK = 2**27
+"""Cells in a frame past which it takes minutes, and the plan says so."""
 
 SPARE_MEMORY = 0.9
 """Share of the free memory that a plan may take."""
@@ -70,7 +80,9 @@ class Plan:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know before trusting the map."""
-        return self.facts.warnings
+        work = self.program.lattice.cells * len(self.facts.suns)
+        long = (f"map: a frame takes {work:,} cells of water, which is minutes; {TOO_FAR}",) if work > LONG_WORK else ()
+        return (*self.facts.warnings, *long)
 
     def copies(self, buffer: Buffer) -> int:
         """Count how often a buffer is allocated."""
@@ -150,9 +162,13 @@ def make_plan(
     check_map_fits(scene, device, free_memory(device))
     facts = gather_facts(scene, load_assets(scene))
     program = METHODS[name](facts)
+    check_work(facts, program)
     lanes = min(resolve_threads(threads, device), program.strips * len(facts.suns)) if program.banded else 1
     plan = Plan(name, device, lanes, facts, program, _buffers(facts, program))
     free = free_memory(device)
+    if plan.bytes > SPARE_MEMORY * free and threads is None:
+        # Each thread has a map of its own; with fewer there may be room.
+        plan = replace(plan, threads=1)
     if plan.bytes > SPARE_MEMORY * free:
         raise InputError(
             f"map: {scene.map.resolution[0]} x {scene.map.resolution[1]} pixels by method {name} take {plan.bytes:,} "
@@ -170,11 +186,32 @@ def check_map_fits(scene: Scene, device: str, free: int) -> None:
         With the bytes that it takes and those that are free.
     """
     columns, rows = scene.map.resolution
+    if columns * rows * scene.channels > MOST_VALUES:
+        raise InputError(
+            f"map.resolution: {columns} x {rows} pixels take at least {columns * rows * 4 * (1 + scene.channels):,} "
+            f"bytes, and no array holds more than {MOST_VALUES:,} values; expected a smaller map"
+        )
     least = columns * rows * 4 * (1 + scene.channels)
     if least > SPARE_MEMORY * free:
         raise InputError(
             f"map.resolution: {columns} x {rows} pixels take at least {least:,} bytes, and {device} has {free:,} free; "
             "expected a map that fits in memory"
+        )
+
+
+def check_work(facts: Facts, program: Program) -> None:
+    """Refuse a frame that would take days.
+
+    Raises
+    ------
+    InputError
+        With the cells that it takes.
+    """
+    work = program.lattice.cells * len(facts.suns)
+    if work > MOST_WORK:
+        raise InputError(
+            f"map: a frame takes {program.lattice.cells:,} cells of water for each of {len(facts.suns)} sun "
+            f"direction(s), and {MOST_WORK:,} in all are what can be gone through; {TOO_FAR}"
         )
 
 

@@ -18,6 +18,15 @@ if TYPE_CHECKING:
     from .window import Lattice
 
 
+MOST_JOBS = 4096
+"""Strips times directions of the sun at most: each is recorded, at 4 KB and a tenth of a millisecond a launch."""
+
+
+def strip_rows(least: int, lattice: Lattice, suns: int) -> int:
+    """Rows of a strip: at least so many, and so many that there are not too many strips to record."""
+    return min(max(least, -(-lattice.count[1] * suns // MOST_JOBS)), lattice.count[1])
+
+
 @dataclass(frozen=True)
 class Buffer:
     """An array of a program: its element by Warp's name, and its shape; a ``per_lane`` one exists once a thread."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -12,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
-from .errors import InputError
+from .errors import InputError, RenderError
 from .kernels.deposit import ACCUMULATOR, FLUX, unit
 from .kernels.resolve import make_dry_land, make_resolve
 from .ledger import read_energy
 from .plan import Plan, make_plan
 from .result import Result
 from .state import SceneState
+from .water import LONGEST_TIME
 
 if TYPE_CHECKING:
     from .scene import Scene
@@ -29,6 +29,11 @@ DTYPES: Mapping[str, Any] = {"float32": wp.float32, "vec1": FLUX[1], "vec2": wp.
 
 OUTPUT = "_out"
 """Ending of a kernel's parameters that it writes; the buffer's name is what stands before it."""
+
+
+LEFT_OUT = frozenset({"column_waves", "row_waves", "state", "torn_cells"})
+"""Buffers that a kernel names and does not touch where its specification leaves them out. All others must be there:
+Warp would write through the pointer of an array that is not."""
 
 
 @dataclass(frozen=True)
@@ -98,10 +103,10 @@ class Renderer:
         Raises
         ------
         InputError
-            If the time is not finite.
+            If the time is not finite, or so late that the waves' phases are not known.
         """
-        if not math.isfinite(time):
-            raise InputError(f"time: expected a finite number of seconds, got {time}")
+        if not abs(time) <= LONGEST_TIME:
+            raise InputError(f"time: expected a number of seconds up to {LONGEST_TIME:g} either way, got {time}")
         start = perf_counter()
         self._state.write(time)
         if self._pool is None:
@@ -179,14 +184,14 @@ class Renderer:
         facts, program = self.plan.facts, self.plan.program
         colours = len(facts.irradiance)
         # A cell's flux over a pixel's area is its share of the pixel; each direction of the sun has its own share.
-        share = program.lattice.step**2 / len(facts.suns) * unit(program.accumulate)
+        share = program.lattice.step**2 * facts.sun_share * unit(program.accumulate)
         scale = [share * facts.irradiance[i % colours] for i in range(3)]
+        one_sun = wp.vec3(*(facts.sun_share * facts.irradiance[i % colours] for i in range(3)))
         resolve = make_resolve(program.accumulate, facts.spec.channels, colours)
         values = {
             "lanes": self._maps, "scale": wp.vec3d(*scale), "map": self._caustic_map, "scene": self._state.scene,
             "suns": self._state.suns, "pixel": wp.vec2(*facts.pixel), "columns": facts.scene.map.resolution[0],
-            "irradiance": wp.vec3(*(facts.irradiance[i % colours] for i in range(3))), "colours": colours,
-            "dry": self._dry,
+            "irradiance": one_sun, "colours": colours, "dry": self._dry,
         }  # fmt: skip
         closing = [self._bind(resolve, self._caustic_map.shape, values)]
         if facts.spec.shore:
@@ -201,9 +206,11 @@ class Renderer:
             name = argument.label.removesuffix(OUTPUT)
             if name in values:
                 arguments.append(values[name])
-            else:
+            elif name in LEFT_OUT:
                 kind: Any = argument.type
                 arguments.append(wp.empty((0,) * kind.ndim, dtype=kind.dtype, device=self.plan.device))
+            else:
+                raise RenderError(f"kernel {kernel.key}: nothing in the plan is called {name!r}")
         return wp.launch(kernel, dim=dim, inputs=arguments, device=self.plan.device, record_cmd=True)
 
     def _run(self, lane: int) -> None:

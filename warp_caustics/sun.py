@@ -38,10 +38,11 @@ def disk_directions(direction: np.ndarray, half_angle: float, count: int) -> np.
     right /= np.linalg.norm(right)
     up = np.cross(direction, right)
     i = np.arange(count)
-    radius = np.tan(half_angle) * np.sqrt((i + 0.5) / count)
+    # Equal steps of the cosine are equal solid angles.
+    cosine = 1.0 - (1.0 - np.cos(half_angle)) * (i + 0.5) / count
+    sine = np.sqrt(1.0 - cosine**2)[:, None]
     turn = i * GOLDEN_ANGLE
-    rays = direction + radius[:, None] * (np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up)
-    return rays / np.linalg.norm(rays, axis=1, keepdims=True)
+    return cosine[:, None] * direction + sine * (np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up)
 
 
 def refract_slopes(direction: np.ndarray, slopes: np.ndarray, ior: float) -> np.ndarray:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .errors import InputError
 from .height_map import sample_heights, surface_hull
 
 if TYPE_CHECKING:
@@ -51,14 +50,7 @@ def phases(scene: Scene, time: float, depth: float) -> np.ndarray:
     """Phase of each wave at the map's origin at a time, reduced to [0, 2 pi) [rad].
 
     Taken in float64, so that neither a distant map nor a late time costs the kernels a digit.
-
-    Raises
-    ------
-    InputError
-        If the time is not finite, or so late that a phase is not known.
     """
-    if not abs(time) <= LONGEST_TIME:
-        raise InputError(f"time: expected a number of seconds up to {LONGEST_TIME:g} either way, got {time}")
     waves = scene.water.waves or ()
     k = np.array([wave.wavevector for wave in waves], dtype=np.float64).reshape(-1, 2)
     given = [wave.angular_frequency for wave in waves]

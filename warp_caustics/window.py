@@ -13,13 +13,16 @@ from .sun import refract_slopes
 STEEPEST_RAY = 20.0
 """Tangent of the flattest refracted ray that the window is made for (87 degrees from the vertical)."""
 
+FLOAT32 = 1e-6
+"""Share of a way by which the kernels' float32 may land elsewhere: some roundings of 6e-8."""
+
 MARGIN = 0.02
 """Share by which bounds are widened: refraction is tried at points of the set of slopes, and bends between them."""
 
 TOO_FAR = "light spreads far for pixels this small: make them larger, or the water shallower or calmer"
 
-MOST_CELLS = 2**33
-"""Cells in a frame at most, all directions of the sun together: a core goes through them in a day."""
+MOST_CELLS = 2**36
+"""Cells at most: there is no frame with as many (the plan refuses it sooner), and their count fits an integer."""
 
 INDEX_BOUND = 2**24
 """Rows or columns at most: float32 counts whole numbers up to here."""
@@ -116,8 +119,10 @@ def deviation_bounds(
     pixel : ndarray
         Width and height of a pixel [m].
     """
-    ends = np.array([depth * way for depth in depths for way in ways]) - reference * rest
-    return ends.min(axis=0) / pixel, ends.max(axis=0) / pixel
+    far = np.array([depth * way for depth in depths for way in ways])
+    spare = FLOAT32 * (np.abs(far).max(axis=0) + np.abs(reference * rest))
+    ends = far - reference * rest
+    return (ends.min(axis=0) - spare) / pixel, (ends.max(axis=0) + spare) / pixel
 
 
 def lattice_over(low: np.ndarray, high: np.ndarray, resolution: tuple[int, int], step: float) -> Lattice:

@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels.beam import make_cells, make_corners
 from ..kernels.patch import BORDER, flux_planes
 from ..kernels.torn import make_torn
-from ..program import Buffer, Pass, Program, wave_pass
+from ..program import Buffer, Pass, Program, strip_rows, wave_pass
 from ..window import lattice_over
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def beam(facts: Facts) -> Program:
     settings, spec = facts.scene.method.beam, facts.spec
     low, high = facts.deviation
     lattice = lattice_over(low, high, facts.scene.map.resolution, float(np.sqrt(1.0 / settings.samples_per_pixel)))
-    columns, rows = lattice.count[0], min(STRIP_ROWS, lattice.count[1])
+    columns, rows = lattice.count[0], strip_rows(STRIP_ROWS, lattice, len(facts.suns))
     beside = 1 + 2 * BORDER
     corners = (rows + beside, columns + beside)
     waves = wave_pass(spec, lattice, facts.waves, rows, beside, -float(BORDER))
