@@ -2,7 +2,8 @@
 
 As published, with the errata mended: the illumination centre is P_C = P_G - h R0_xy / |R0_z|, channels are counted
 from zero, and pass 2 fetches channel j from j - M/2 rows above. The lattice of the intersections is the map's own
-pixels with a border of half a window; the lattice's anchor makes each pixel's illumination centre its own cell.
+pixels with a border; the lattice's anchor makes each pixel's illumination centre its own cell. The border holds all
+the water that can light the map, also where the windows are narrower, so that what they miss is known.
 """
 
 import functools
@@ -11,7 +12,7 @@ import warp as wp
 
 from .deposit import FLUX
 from .lattice import Lattice, at_rest, clip_to_water, deviation, on_water, share_of_cell
-from .ledger import make_book_landed, make_count_unlanded
+from .ledger import MISSED_BY_WINDOW, make_book_landed, make_count_unlanded, tally
 from .photon import LANDED, Scene, SunSample, make_photon
 from .spec import Spec
 from .wave_table import make_water_on_lattice
@@ -71,6 +72,9 @@ def make_intersections(spec: Spec) -> wp.Kernel:
                 flux[c] = share * result.arrived[c]
             inside = box_inside(pixel[0] + offset[0], lattice.map[0]) * box_inside(pixel[1] + offset[1], lattice.map[1])
             book_landed(ledger_out, bin, share * result.incident, share * result.transmitted, flux, inside * flux)
+            # What lands in the map; the host takes off what the windows then find of it.
+            for c in range(wp.static(channels)):
+                tally(ledger_out, MISSED_BY_WINDOW * wp.static(channels) + c, bin, inside * flux[c])
         else:
             count_unlanded(ledger_out, bin, result.state, share * result.incident, share * result.transmitted)
         landing_out[row, column] = offset
@@ -95,6 +99,7 @@ def make_rows(channels: int) -> wp.Kernel:
         # In:
         landing: wp.array2d[wp.vec2],
         flux: wp.array2d[flux_type],
+        first: wp.vec2i,
         n: int,
         m: int,
         # Out:
@@ -102,16 +107,18 @@ def make_rows(channels: int) -> wp.Kernel:
     ):
         """One thread a pixel of a column of the map that reaches m / 2 rows past it; launch dims (rows, columns).
 
-        ``channel_out[j, row, column]`` is what row ``row`` gives to the pixel ``j - m / 2`` rows above it.
+        ``channel_out[j, row, column]`` is what row ``row`` gives to the pixel ``j - m / 2`` rows above it; ``first`` is
+        the sample (column, row) at which the window of the first thread's pixel begins.
         """
         row, column = wp.tid()
         for j in range(m + 1):
             channel_out[j, row, column] = flux_type()
         for i in range(n):
-            sample = landing[row, column + i]
+            at = wp.vec2i(column + first[0] + i, row + first[1])
+            sample = landing[at[1], at[0]]
             ax = box_overlap(sample[0] + float(i - n // 2))
             if ax > 0.0:
-                light = ax * flux[row, column + i]
+                light = ax * flux[at[1], at[0]]
                 for j in range(m + 1):
                     ay = box_overlap(sample[1] - float(j - m // 2))
                     if ay > 0.0:

@@ -14,6 +14,10 @@ import numpy as np
 import warp_caustics as wc
 from oracle.cases import sunlight
 
+IOR = 1.333
+LEDGER = 1e-6  # a float32 map against a float64 ledger
+LOSSES = ("received", "reflected", "absorbed", "outside_map", "left_water", "blocked", "missed_by_window", "dropped")
+
 METHODS = ("beam", "photon", "gather")
 FREE_METHODS = ("beam", "photon")  # take any receiver
 ANY_SUN = sunlight(35.0)
@@ -49,7 +53,7 @@ def scene(
         water={"level": level, "self_shadow": self_shadow, **water},
         receiver={"plane": 0.0} if receiver is None else receiver,
         sun={"direction": direction, **(sun or {})},
-        medium={"ior": 1.333} if medium is None else medium,
+        medium={"ior": IOR} if medium is None else medium,
         map={"origin": origin, "size": size, "resolution": resolution},
         method=method or {},
     )
@@ -124,3 +128,25 @@ def relative_l2(one: np.ndarray, other: np.ndarray) -> float:
     """Give the root mean square difference over the mean of ``other``."""
     difference = one.astype(np.float64) - other
     return float(np.sqrt(np.mean(difference**2)) / np.mean(other, dtype=np.float64))
+
+
+def refracted(direction: Any) -> np.ndarray:
+    """Give the horizontal way by unit depth of light under flat water."""
+    x, y, _ = direction
+    return np.array([x, y]) / IOR / np.sqrt(1.0 - (x * x + y * y) / IOR**2)
+
+
+def assert_adds_up(result: wc.Result) -> None:
+    """Every entry is there, none is negative, and they add up; the map's sum is what was received, and dry."""
+    energy = result.energy
+    emitted = np.asarray(energy.emitted)
+    assert (emitted > 0.0).all()
+    np.testing.assert_allclose(sum(np.asarray(energy[name]) for name in LOSSES), emitted, rtol=LEDGER)
+    assert energy.unaccounted < LEDGER
+    for name, value in energy.items():
+        assert np.min(value) >= -LEDGER * emitted.max(), name
+    assert np.max(energy.dropped) == 0.0
+    channels = result.caustic_map.shape[2:]
+    pixel_area = np.prod(result.scene.map.size) / np.prod(result.scene.map.resolution)
+    landed = result.caustic_map.reshape(-1, *channels).sum(axis=0, dtype=np.float64) * pixel_area
+    np.testing.assert_allclose(landed, np.add(energy.received, energy.dry), rtol=LEDGER)

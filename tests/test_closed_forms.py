@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenery import METHODS, relative_l2, render, sample_points, save_heights, scene, wave
+from scenery import IOR, METHODS, refracted, relative_l2, render, sample_points, save_heights, scene, wave
 
 from oracle import first_focus_depth, sine_folds, sine_irradiance, sine_landing
 from oracle.cases import sunlight
@@ -17,7 +17,6 @@ FOLDED_ERROR = {"beam": 5e-3, "photon": 0.15, "gather": 0.4}
 CREST_ERROR = {"beam": 1e-2, "photon": 0.02, "gather": 0.1}
 CHOSEN = {"photon": {"photons_per_pixel": 16.0, "footprint": "pixel"}}
 
-IOR = 1.333
 WAVELENGTH = 0.96
 K = 2.0 * np.pi / WAVELENGTH
 AMPLITUDE = 0.01
@@ -156,7 +155,6 @@ def test_the_light_of_eq_3_3_lands_too_far_by_its_printed_share(device, zenith, 
     )  # fmt: skip
     image = render(what, "photon", device).caustic_map
     x, y = sample_points(image.shape, what.map.origin, what.map.size)
-    inside = np.sin(np.radians(zenith)) / IOR
-    exactly = inside / np.sqrt(1.0 - inside**2)
+    exactly = refracted(sunlight(zenith, 0.0))[0]
     assert (image * x).sum() / image.sum() == pytest.approx(share * exactly, abs=5e-3)
     assert (image * y).sum() / image.sum() == pytest.approx(0.0, abs=1e-4)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scenery import (
     FREE_METHODS,
+    LEDGER,
     METHODS,
+    assert_adds_up,
     bundled,
     render,
     sample_points,
@@ -23,7 +25,6 @@ import warp_caustics as wc
 from oracle.cases import CASES, sunlight
 
 EXACT = 1e-5  # what the issue asks on planes: float32 sums of some hundred cells a pixel
-LEDGER = 1e-6  # a float32 map against a float64 ledger
 LEDGER_OF_CELLS = 1e-4  # what a beam's cells make of where the water turns from the sun
 PHASES = 16  # frames over a period: their mean holds no first to fifteenth harmonic of what crosses the window's ends
 # The beam's energy is right to 1e-4 in every case; a photon is lit or not, and a low sun lights 10 to 30 of a wave's.
@@ -36,23 +37,6 @@ STEEP_FACTORS = {60.0: 1.06, 70.0: 1.27, 80.0: 1.98, 85.0: 3.43}  # physics.md, 
 OVER_LIT_WARNING = "enters twice"
 
 TELLING = {"shore": "dry", "hills": "outside_map", "leaving": "left_water", "shaded": "blocked"}
-LOSSES = ("received", "reflected", "absorbed", "outside_map", "left_water", "blocked", "missed_by_window", "dropped")
-
-
-def assert_adds_up(result):
-    """Every entry is there, none is negative, and they add up; the map's sum is what was received, and dry."""
-    energy = result.energy
-    emitted = np.asarray(energy.emitted)
-    assert (emitted > 0.0).all()
-    np.testing.assert_allclose(sum(np.asarray(energy[name]) for name in LOSSES), emitted, rtol=LEDGER)
-    assert energy.unaccounted < LEDGER
-    for name, value in energy.items():
-        assert np.min(value) >= -LEDGER * emitted.max(), name
-    assert np.max(energy.dropped) == 0.0
-    channels = result.caustic_map.shape[2:]
-    pixel_area = np.prod(result.scene.map.size) / np.prod(result.scene.map.resolution)
-    landed = result.caustic_map.reshape(-1, *channels).sum(axis=0, dtype=np.float64) * pixel_area
-    np.testing.assert_allclose(landed, np.add(energy.received, energy.dry), rtol=LEDGER)
 
 
 def periodic_waves(size, slope, turns=((1, 0), (0, 2), (2, -1), (-1, 3))):

@@ -30,7 +30,11 @@ def gather(landing, flux, n, m, resolution, device, before=None):
     start = np.zeros(rows * columns * channels) if before is None else before.ravel()
     out = wp.array(start.astype(np.float32), dtype=float, device=device)
     wp.launch(
-        make_rows(channels), dim=(rows + m, columns), inputs=[samples, light, n, m], outputs=[channel], device=device
+        make_rows(channels),
+        dim=(rows + m, columns),
+        inputs=[samples, light, wp.vec2i(0, 0), n, m],
+        outputs=[channel],
+        device=device,
     )
     wp.launch(make_columns(channels), dim=(rows, columns), inputs=[channel, m], outputs=[out], device=device)
     return out.numpy().reshape(rows, columns, channels).astype(np.float64)

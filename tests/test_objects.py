@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scenery import ANY_SUN, FREE_METHODS, IOR, assert_adds_up, refracted, render, save_box, scene
+from scenery import ANY_SUN, FREE_METHODS, assert_adds_up, refracted, render, save_box, scene
 
 from oracle.cases import sunlight
 

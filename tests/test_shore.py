@@ -1,18 +1,19 @@
-"""Receivers of every kind: land that rises out of the water, the same floor given in other ways, and water from files."""
+"""Receivers of every kind: land that rises out of the water, one floor given in several ways, and water from files."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from scenery import (
-    ANY_SUN,
     FREE_METHODS,
     GENTLE,
+    LEDGER,
     METHODS,
+    assert_adds_up,
+    refracted,
     relative_l2,
     render,
     sample_points,
-    save_box,
     save_heights,
     save_quad,
     scene,
@@ -24,27 +25,12 @@ import warp_caustics as wc
 from oracle.cases import sunlight
 
 ROUNDING = 2e-5  # float32 landings a few metres away, in pixels of some centimetres
-LEDGER = 1e-6
 # A shoreline is cut to 1/16 of a cell in the beam's pixels, and to the box of a photon in the photon's.
 SHORELINE = {"beam": 5e-3, "photon": 5e-2}
 # The same scene on another lattice: a beam is right to its own error, photons leave the noise of 4 a pixel.
 OTHER_LATTICE = {"beam": 2e-3, "photon": 8e-2}
 HEIGHT_MAP = 5e-4  # bicubic through 15 and more samples a wave, its slopes right to the fourth order
 CUT_CELL = 1e-3  # [W] of 4: light of a cell that the border cuts, spread over the cell whole
-IOR = 1.333
-
-
-def refracted(direction):
-    """Horizontal way by unit depth under flat water."""
-    x, y, _ = direction
-    return np.array([x, y]) / IOR / np.sqrt(1.0 - (x * x + y * y) / IOR**2)
-
-
-def assert_adds_up(result):
-    assert result.energy.unaccounted < LEDGER
-    assert np.max(result.energy.dropped) == 0.0
-    for name, value in result.energy.items():
-        assert np.min(value) >= -LEDGER * np.max(result.energy.emitted), name
 
 
 # --- land ----------------------------------------------------------------------------------------------------------

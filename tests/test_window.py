@@ -187,7 +187,8 @@ def test_deviation_is_measured_from_where_light_lands_at_rest():
     way = reach.low + share * (reach.high - reach.low)
     deviation = (depth * way - 2.0 * reach.rest) / [0.5, 0.25]
     assert (deviation >= low - ROUNDING).all() and (deviation <= high + ROUNDING).all()
-    assert high[0] == pytest.approx((3.0 * reach.high[0] - 2.0 * reach.rest[0]) / 0.5)
+    # Beside that only the room for float32.
+    assert high[0] == pytest.approx((3.0 * reach.high[0] - 2.0 * reach.rest[0]) / 0.5, rel=2e-5)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 7, 8, 64, 256])

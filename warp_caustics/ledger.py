@@ -43,8 +43,8 @@ def read_energy(plan: Plan, ledgers: np.ndarray, caustic_map: np.ndarray, dry: n
     entries["dry"] = dry[:colours] * pixel_area if len(dry) else np.zeros(colours)
     entries["received"] = landed - entries["dry"]
     if plan.method == "gather":
-        inside = entries["emitted"] - sum(entries[name] for name in ENTRIES if name not in ("emitted", "over_lit"))
-        entries["missed_by_window"] = inside - entries["received"]
+        # The kernels book all that lands in the map.
+        entries["missed_by_window"] = entries["missed_by_window"] - entries["received"]
     beyond = _beyond_border(facts) * np.asarray(facts.irradiance)
     entries["emitted"] = entries["emitted"] + beyond
     entries["missed_by_window"] = entries["missed_by_window"] + beyond

@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..kernels.gather import make_columns, make_intersections, make_rows
 from ..program import Buffer, Pass, Program, wave_pass
-from ..window import Lattice
+from ..window import INDEX_BOUND, TOO_FAR, Lattice
 
 if TYPE_CHECKING:
     from ..facts import Facts
@@ -41,9 +41,11 @@ def gather(facts: Facts) -> Program:
             f'method.accumulate = "{scene.method.accumulate}": gather adds up in registers, in a fixed order and in '
             'float32; leave it out, or use method "beam" or "photon"'
         )
-    n, m = _window(facts)
-    (columns, rows), half = scene.map.resolution, n // 2
-    lattice = Lattice((-half, -(m // 2)), (columns + 2 * half, rows + m), 1.0)
+    columns, rows = scene.map.resolution
+    needed = _widest(facts)
+    n, m = _window(facts, needed)
+    left, below = max(n // 2, needed[0]), max(m // 2, needed[1])
+    lattice = Lattice((-left, -below), (columns + 2 * left, rows + 2 * below), 1.0)
     grid = (lattice.count[1], lattice.count[0])
     flux = f"vec{spec.channels}"
     waves = wave_pass(spec, lattice, facts.waves, grid[0], 0, 0.5)
@@ -65,16 +67,29 @@ def gather(facts: Facts) -> Program:
             Buffer("flux", flux, grid, 4 * spec.channels),
             Buffer("channel", flux, (m + 1, rows + m, columns), 4 * spec.channels),
         ),
-        values={**waves.values, "n": n, "m": m},
+        values={**waves.values, "first": (left - n // 2, below - m // 2), "n": n, "m": m},
         settings={"n": n, "m": m},
         banded=False,
     )  # fmt: skip
 
 
-def _window(facts: Facts) -> tuple[int, int]:
-    """N and M: those of the scene, or wide enough for the largest deflection from the illumination centre."""
-    settings = facts.scene.method.gather
+def _widest(facts: Facts) -> tuple[int, int]:
+    """Pixels that light is deflected from its illumination centre at most, with the reach of a box.
+
+    Raises
+    ------
+    InputError
+        If they cannot be counted.
+    """
     widest = np.ceil(np.maximum(-facts.deviation[0], facts.deviation[1]) + BOX_REACH)
-    n = 2 * int(widest[0]) + 1 if settings.n is None else settings.n
-    m = 2 * int(widest[1]) if settings.n is None else max(settings.n - 1, LEAST_M)
+    if not widest.max() < INDEX_BOUND:
+        raise InputError(f"map: light lands {widest.max():.3g} pixels from where it does at rest; {TOO_FAR}")
+    return int(widest[0]), int(widest[1])
+
+
+def _window(facts: Facts, widest: tuple[int, int]) -> tuple[int, int]:
+    """N and M: those of the scene, or wide enough for the largest deflection."""
+    settings = facts.scene.method.gather
+    n = 2 * widest[0] + 1 if settings.n is None else settings.n
+    m = 2 * widest[1] if settings.n is None else max(settings.n - 1, LEAST_M)
     return n, m if settings.m is None else settings.m
