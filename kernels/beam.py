@@ -20,6 +20,7 @@ from .patch import (
     arrived_plane,
     integral_weights,
     make_deposit_patch,
+    misses_map,
     plane_bend,
     plane_jump,
     plane_mean,
@@ -166,6 +167,9 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
                 thick = thickness(planes, row, column, high - low)
                 left = wp.clamp(wp.static(BEND_SHARE) * thick, wp.static(BEND_LEAST), wp.static(BEND_MOST))
                 n = wp.clamp(int(wp.ceil(wp.sqrt(bend / left))), 1, wp.static(FINEST))
+                # A cubic bulges over its chord by its bend, with room to spare.
+                if n > 1 and misses_map(planes, lattice, row, column, low, high - low, 4.0 * bend + 1.0):
+                    n = int(1)
             if wp.static(edges):
                 if whole == 1 and common != 0:
                     jump = wp.max(plane_jump(planes, 0, row, column), plane_jump(planes, 1, row, column))

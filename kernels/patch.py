@@ -143,6 +143,40 @@ def plane_jump(planes: wp.array3d[float], plane: int, row: int, column: int) -> 
 
 
 @wp.func
+def side_misses(
+    planes: wp.array3d[float], axis: int, row: int, column: int, low: float, high: float, top: float
+) -> bool:
+    """Tell whether all corners of a cell land below ``low`` or above ``high`` along an axis, from its first at rest.
+
+    ``top`` is the rest coordinate of the far corners along the axis; all in pixels.
+    """
+    a = planes[axis, row + 1, column + 1]
+    b = planes[axis, row + 1, column + 2]
+    c = planes[axis, row + 2, column + 1]
+    d = planes[axis, row + 2, column + 2]
+    least = wp.min(wp.min(a, b), wp.min(c, d))
+    most = wp.max(wp.max(a, b), wp.max(c, d)) + top
+    return most < low or least > high
+
+
+@wp.func
+def misses_map(
+    planes: wp.array3d[float], lattice: Lattice, row: int, column: int, corner: wp.vec2, side: wp.vec2, spare: float
+) -> bool:
+    """Tell whether a cell at rest at ``corner`` [pixels] lands beside the map, by more than ``spare``.
+
+    Cutting such a cell finer would show nothing, and its light is counted all the same.
+    """
+    x_low = -spare - corner[0]
+    x_high = float(lattice.map[0]) + spare - corner[0]
+    y_low = -spare - corner[1]
+    y_high = float(lattice.map[1]) + spare - corner[1]
+    return side_misses(planes, 0, row, column, x_low, x_high, side[0]) or side_misses(
+        planes, 1, row, column, y_low, y_high, side[1]
+    )
+
+
+@wp.func
 def thickness(planes: wp.array3d[float], row: int, column: int, side: wp.vec2) -> float:
     """Width of a landed cell across its longer diagonal [pixels]; nothing at a focus, where it is a sliver."""
     a = wp.vec2(planes[0, row + 1, column + 1], planes[1, row + 1, column + 1])

@@ -196,6 +196,21 @@ def test_needles_lie_along_their_line(device):
     assert maps.min() >= 0.0
 
 
+def test_thin_triangles_lose_nothing_to_rounding(device):
+    """Just too wide for a needle, their overlaps are rounded to 1e-3 of their area: what is left over is made good."""
+    rng = np.random.default_rng(12)
+    n, turn = 300, rng.uniform(0.0, 2.0 * np.pi, 300)
+    way = rng.uniform(0.5, 4.0, (n, 1)) * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    aside = rng.uniform(4e-4, 1e-3, (n, 1)) * np.stack([-np.sin(turn), np.cos(turn)], axis=1)
+    middle = rng.uniform(2.0, [COLUMNS - 2.0, ROWS - 2.0], (n, 2))
+    bases = np.floor(middle).astype(int)
+    corners = np.stack([-0.5 * way, 0.5 * way, rng.uniform(-0.5, 0.5, (n, 1)) * way + aside], axis=1)
+    corners = corners + (middle - bases)[:, None, :]
+    maps, inside = check(corners, bases, device)
+    assert np.abs(maps.sum(axis=(1, 2)) - 1.0).max() < ENERGY_TOLERANCE
+    assert (inside == 1.0).all()
+
+
 def test_needles_along_a_row_a_column_and_a_pixel_line(device):
     """Edge-on cells of flat water: lines of no area at all, the last one just on the border between rows."""
     corners = np.array([[[1.25, 2.5], [4.25, 2.5], [2.25, 2.5]], [[3.5, 1.25], [3.5, 1.5], [3.5, 6.75]],

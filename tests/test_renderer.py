@@ -203,9 +203,9 @@ def test_no_time_is_no_frame(device, time):
     renderer = wc.Renderer(scene(GENTLE), "photon", device, threads=1)
     renderer.render(0.5)
     before = renderer.result()
-    with pytest.raises(wc.InputError, match="time: expected a finite number"):
+    with pytest.raises(wc.InputError, match="time: expected"):
         renderer.render(time)
-    with pytest.raises(wc.InputError, match="time: expected a finite number"):
+    with pytest.raises(wc.InputError, match="time: expected"):
         wc.render(scene(GENTLE), method="photon", device=device, time=time)
     assert renderer.result().time == 0.5
     np.testing.assert_array_equal(renderer.result().caustic_map, before.caustic_map)

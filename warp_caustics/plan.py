@@ -11,6 +11,7 @@ from .errors import InputError
 from .facts import Facts, gather_facts
 from .kernels.deposit import ACCUMULATOR
 from .kernels.ledger import BINS, ENTRIES
+from .magnitude import check_magnitudes
 from .methods import METHODS
 from .program import Buffer, Program
 from .scene import Scene, known_method, load_scene
@@ -159,6 +160,7 @@ def make_plan(
         scene = load_scene(scene)
     name = known_method(method if method is not None else scene.method.name)
     device = resolve_device(device)
+    check_magnitudes(scene)
     check_map_fits(scene, device, free_memory(device))
     facts = gather_facts(scene, load_assets(scene))
     program = METHODS[name](facts)
