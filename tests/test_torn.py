@@ -20,8 +20,8 @@ FLAT_TOLERANCE = 2e-5
 ENERGY_TOLERANCE = 1e-5
 # An edge is found to a part of a cell, 1/4 pixel, and a wall's light to that over the way that lights it.
 EDGE_TOLERANCE = 0.05
-# Parts of a quarter of a cell, each a parallelogram, against triangles on a cubic: what a finer lattice would leave.
-PARTS_TOLERANCE = 0.02
+# Parts of a quarter of a cell, each a parallelogram, against triangles on a cubic; 0.02 without the water's curvature.
+PARTS_TOLERANCE = 0.01
 
 # From a wall to its top the landing has a kink: the cubic through it swings for this many pixels.
 KINK = 2.0

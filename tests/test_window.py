@@ -11,7 +11,7 @@ from oracle.optics import refract_slopes as oracle_refract_slopes
 from warp_caustics.assets import Assets, load_assets
 from warp_caustics.errors import InputError
 from warp_caustics.facts import gather_facts
-from warp_caustics.sun import DOTS_PER_PIXEL, MOST_DIRECTIONS, disk_count, disk_directions, refract_slopes
+from warp_caustics.sun import MOST_DIRECTIONS, disk_count, disk_directions, refract_slopes
 from warp_caustics.water import amplitude_bound, extreme_slopes
 from warp_caustics.window import INDEX_BOUND, STEEPEST_RAY, deviation_bounds, lattice_over, refraction_reach
 
@@ -21,6 +21,7 @@ ROUNDING = 1e-9
 WIDEST = 1.25
 HALF_ANGLE = np.radians(0.2665)
 IOR = 1.333
+
 
 def sunlight(zenith, azimuth):
     """Direction of travel from angles in degrees."""
@@ -244,8 +245,8 @@ def test_the_disk_blurs_as_it_should_and_is_sampled_finely_enough_for_it(zenith,
     assert 2 < count < MOST_DIRECTIONS
     dots = disk_landings(zenith, count, depth) / pixel
     apart = np.linalg.norm(dots[:, None] - dots[None, :], axis=2) + 1e9 * np.eye(count)
-    # Dots half a pixel apart along and across are no farther than that from the next one.
-    assert np.median(apart.min(axis=1)) < 1.2 / DOTS_PER_PIXEL
+    # Half a pixel between dots is what no pixel shows; in a sunflower some are a little wider apart.
+    assert np.median(apart.min(axis=1)) < 0.6
 
 
 def test_a_point_sun_is_one_direction_and_a_deep_sea_is_capped():

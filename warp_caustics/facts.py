@@ -1,7 +1,4 @@
-"""What follows from a scene, derived once: the specification of its kernels, the bounds of its light, the reasons.
-
-Each decision to leave something out is taken here, and its reason is kept for the plan to print.
-"""
+"""What follows from a scene, derived once: the specification of its kernels, and the bounds of its light."""
 
 from __future__ import annotations
 
@@ -12,26 +9,14 @@ import numpy as np
 
 from .kernels.spec import Spec
 from .receiver import SHALLOWEST, Bounds, check_covered, receiver_bounds, receiver_kind, rest_depth
-from .scene import IOR_TABLE, JERLOV_TABLE
+from .specify import Light, Reason, reasons, specify
 from .sun import MOST_DIRECTIONS, disk_count, disk_directions
 from .water import amplitude_bound, extreme_slopes
-from .window import Reach, deviation_bounds, refraction_reach
+from .window import deviation_bounds, refraction_reach
 
 if TYPE_CHECKING:
     from .assets import Assets
     from .scene import Scene
-
-GREEN = 1
-"""The channel whose index of refraction stands for all where there is no dispersion."""
-
-
-@dataclass(frozen=True)
-class Reason:
-    """One thing that a scene could need: whether it does, and why."""
-
-    what: str
-    kept: bool
-    why: str
 
 
 @dataclass(frozen=True)
@@ -80,7 +65,9 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         If the map reaches past the terrain.
     """
     check_covered(scene, assets)
-    ior, warnings = _ior(scene)
+    ior, warnings = scene.medium.green_ior, []
+    if len(set(scene.medium.ior_by_channel)) > 1:
+        warnings.append(f"medium.ior: given by channel without dispersion, so green's {ior:g} serves for all")
     pixel = np.asarray(scene.map.size, dtype=np.float64) / np.asarray(scene.map.resolution)
     slopes = extreme_slopes(scene, assets)
     amplitude = amplitude_bound(scene, assets)
@@ -101,7 +88,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     # Eq. 3.3 meets the ground along the unrefracted ray, so wherever that is.
     anywhere = (0.0, max(0.0, -wide.lowest) + amplitude)
     by_backlund = _deviation([((r.backlund_low, r.backlund_high), r.rest) for r in reaches], anywhere, reference, pixel)
-    spec, reasons = _specify(scene, assets, suns, slopes, amplitude, reaches, wide)
+    spec = specify(scene, assets, Light(suns, slopes, steepest, amplitude), wide)
     if spec.occluders:
         warnings.append("receiver: a mesh rises above the water; it shades the water, and its dry part is not lit")
     return Facts(
@@ -121,7 +108,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         deviation=deviation,
         backlund_deviation=by_backlund,
         longest_way=float(max(amplitude - wide.lowest, SHALLOWEST) * np.hypot(1.0, steepest)),
-        reasons=reasons,
+        reasons=reasons(scene, spec, len(suns)),
         warnings=tuple(warnings),
     )
 
@@ -137,20 +124,9 @@ def _deviation(
     return np.min([low for low, _ in ends], axis=0), np.max([high for _, high in ends], axis=0)
 
 
-def _ior(scene: Scene) -> tuple[float, list[str]]:
-    ior = scene.medium.ior
-    if isinstance(ior, str):
-        ior = IOR_TABLE[ior]
-    if isinstance(ior, tuple):
-        return ior[GREEN], [
-            f"medium.ior: given by channel without dispersion, so green's {ior[GREEN]:g} serves for all"
-        ]
-    return float(ior), []
-
-
 def _attenuation(scene: Scene) -> tuple[float, float, float]:
     medium = scene.medium
-    values = _colour(medium.absorption if medium.jerlov is None else JERLOV_TABLE[medium.jerlov], 3)
+    values = _colour(medium.diffuse_attenuation or medium.absorption, 3)
     return (values[0], values[1], values[2])
 
 
@@ -180,64 +156,3 @@ def _ground(scene: Scene, assets: Assets, amplitude: float, steepest: float) -> 
         z = assets.objects.vertices[:, 2] - scene.water.level
         bounds = [replace(b, lowest=min(b.lowest, z.min()), highest=max(b.highest, z.max())) for b in bounds]
     return bounds[0], bounds[1]
-
-
-def _specify(
-    scene: Scene, assets: Assets, suns: np.ndarray, slopes: np.ndarray, amplitude: float, reaches: list[Reach],
-    wide: Bounds,
-) -> tuple[Spec, tuple[Reason, ...]]:  # fmt: skip
-    """Decide what the kernels contain, and say why."""
-    kind = receiver_kind(scene)
-    medium, shadow = scene.medium, scene.water.self_shadow
-    steepest = max(reach.steepest for reach in reaches)
-    faces_away = bool((slopes @ suns[:, :2].T - suns[:, 2] < 0.0).any())
-    self_shadow = faces_away and shadow is not False
-    slope = float(np.linalg.norm(slopes, axis=1).max())
-    exits = bool(slope * steepest > 1.0)
-    tears = kind in ("waves", "grid") and bool(wide.slope * steepest >= 1.0)
-    over = bool(wide.highest > -amplitude)
-    objects = assets.objects is not None
-    shore = kind in ("waves", "grid") and over
-    level = scene.water.level
-    meshes = [mesh for mesh in (assets.mesh, assets.objects) if mesh is not None]
-    occluders = any(bool(mesh.vertices[:, 2].max() > level - amplitude) for mesh in meshes)
-    by_depth = medium.jerlov is not None
-    absorbs = by_depth or any(_attenuation(scene))
-    coloured = by_depth or (absorbs and isinstance(medium.absorption, tuple))
-    spec = Spec(
-        water="waves" if assets.water is None else "grid",
-        receiver=kind,
-        objects=objects,
-        bounded=assets.water is not None,
-        shore=shore,
-        occluders=occluders,
-        self_shadow=self_shadow,
-        faces_away=faces_away,
-        exits=exits,
-        tears=tears,
-        fresnel=medium.fresnel,
-        attenuation="none" if not absorbs else "depth" if by_depth else "path",
-        channels=3 if coloured else 1,
-        accumulate=scene.method.accumulate,
-    )
-    up = "the steepest slope stays under the sun's elevation"
-    return spec, (
-        Reason("surface by height map", spec.bounded, "water is a file" if spec.bounded else "water is a sum of waves"),
-        Reason("Fresnel", spec.fresnel, "medium.fresnel" if spec.fresnel else "medium.fresnel is false"),
-        Reason("attenuation", absorbs, f"by {spec.attenuation}" if absorbs else "nothing absorbs: no path length"),
-        Reason("transport by colour", coloured, "absorption differs by channel" if coloured
-               else "all channels travel alike: one is enough"),
-        Reason("self-shadow", self_shadow, "slopes pass the sun's elevation" if self_shadow
-               else "water.self_shadow is false" if faces_away else up),
-        Reason("exit through the surface", exits, "a ray may meet a crest from below" if exits
-               else "no refracted ray is flat enough to meet a crest from below"),
-        Reason("march over terrain", kind in ("waves", "grid"), "receiver.terrain" if kind in ("waves", "grid")
-               else f"the receiver is a {kind}"),
-        Reason("shore", shore, "land may rise above the water" if shore else "no land near the surface"),
-        Reason("torn cells", spec.breaks, "corners of a cell may meet different fates" if spec.breaks
-               else "neighbouring rays stay neighbours"),
-        Reason("BVH", objects or kind == "mesh", "meshes in the scene" if objects or kind == "mesh" else "no meshes"),
-        Reason("sun's disk", len(suns) > 1, f"{len(suns)} directions share the flux" if len(suns) > 1
-               else "one direction: its disk is a point"),
-        Reason("camera", False, "this method does not look" if scene.camera else "no camera"),
-    )  # fmt: skip
