@@ -13,7 +13,7 @@ ORDINARY = 5e-3
 DEEP = 2e-2
 
 # Edges of shadow, shores and silhouettes carry no promise; these hold what was measured, with a margin of a third.
-HARD = {"shaded": 5e-3, "leaving": 1e-1, "shore": 2e-3, "hills": 4.5e-2}
+HARD = {"shaded": 5e-3, "leaving": 1e-1, "shore": 2e-3, "hills": 2e-2}
 
 # Unrefined, the beam is the ideal triangle deposit; half as much again is allowed for float32 and corner conventions.
 IDEAL_FACTOR = 1.5
