@@ -108,15 +108,16 @@ def make_deposit_needle(accumulate: str, channels: int) -> wp.Function:
     ) -> float:  # fmt: skip
         n = wp.clamp(int(wp.ceil(extent * wp.static(NEEDLE_SPACING))), 1, wp.static(NEEDLE_LIMIT))
         step = 1.0 / float(n)
-        inside = float(0.0)
+        hits = int(0)
         for i in range(n):
             for j in range(2 * (n - i) - 1):
                 # Parts pointing up (even j) and down (odd j) of row i, in barycentric steps along b - a and c - a.
                 third = (1.0 + float(j & 1)) / 3.0
                 u = (float(j // 2) + third) * step
                 v = (float(i) + third) * step
-                inside += deposit_point(map, size, base, a + u * (b - a) + v * (c - a), flux, step * step)
-        return inside
+                if deposit_point(map, size, base, a + u * (b - a) + v * (c - a), flux, step * step) > 0.0:
+                    hits += 1
+        return float(hits) * step * step
 
     return deposit_needle
 

@@ -51,6 +51,18 @@ def test_threads_agree(method):
 
 
 @pytest.mark.parametrize("method", FREE_METHODS)
+def test_each_thread_adds_to_a_map_of_its_own(method):
+    # Sums on a CPU are plain additions: two threads on one map would now and then lose light, and no test would see it.
+    renderer = wc.Renderer(tall(), method, "cpu", 2)
+    renderer.render(0.4)
+    lanes = renderer._maps.numpy()
+    assert lanes.shape[0] == 2
+    assert (lanes.sum(axis=1) > 0.1 * lanes.sum()).all()
+    ledgers = renderer._ledgers.numpy()
+    assert (ledgers[:, 0].sum(axis=1) > 0.1 * ledgers[:, 0].sum()).all()
+
+
+@pytest.mark.parametrize("method", FREE_METHODS)
 def test_fixed_point_is_the_same_to_the_bit_for_any_threads_and_every_run(method):
     maps = [frame(wc.Renderer(tall("fixed"), method, "cpu", threads), 0.4) for threads in (1, 2, 8, 1)]
     for image in maps[1:]:

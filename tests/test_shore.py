@@ -30,6 +30,7 @@ SHORELINE = {"beam": 5e-3, "photon": 5e-2}
 # The same scene on another lattice: a beam is right to its own error, photons leave the noise of 4 a pixel.
 OTHER_LATTICE = {"beam": 2e-3, "photon": 8e-2}
 HEIGHT_MAP = 5e-4  # bicubic through 15 and more samples a wave, its slopes right to the fourth order
+DRY_PARTS = 1e-3  # dry land is sampled 4 by 4 times in a pixel
 CUT_CELL = 1e-3  # [W] of 4: light of a cell that the border cuts, spread over the cell whole
 
 
@@ -84,6 +85,27 @@ def test_land_that_faces_away_is_dark(device, method):
     assert result.caustic_map[:, :18].max() == 0.0
     assert result.energy.dry == 0.0
     assert_adds_up(result)
+
+
+@pytest.mark.parametrize("method", FREE_METHODS)
+def test_hills_above_the_water_get_the_light_that_they_face(device, method):
+    waves = [wave(0.3, 4.0, 2.0, 0.4), wave(0.2, -3.0, 5.0, 1.0)]
+    direction, slope = np.array(sunlight(50.0, 25.0)), (0.3, -0.2)
+    what = scene(GENTLE, {"terrain": {"base": 3.0, "slope": slope, "waves": waves}}, tuple(direction))
+    result = render(what, method, device)
+    parts, (rows, columns) = 16, result.caustic_map.shape
+    x, y = sample_points((rows * parts, columns * parts), what.map.origin, what.map.size)
+    zx, zy = np.full((2, rows * parts, columns * parts), np.reshape(slope, (2, 1, 1)))
+    for one in waves:
+        (kx, ky), rise = one["wavevector"], one["amplitude"]
+        rise = rise * np.cos(kx * x + ky * y + one["phase"])
+        zx, zy = zx + kx * rise, zy + ky * rise
+    faced = np.maximum(0.0, zx * direction[0] + zy * direction[1] - direction[2])
+    expected = faced.reshape(rows, parts, columns, parts).mean(axis=(1, 3))
+    assert (expected == 0.0).any()
+    assert relative_l2(result.caustic_map, expected) < DRY_PARTS
+    assert result.energy.received == pytest.approx(0.0, abs=LEDGER)
+    assert result.energy.dry == pytest.approx(faced.mean() * np.prod(what.map.size), rel=DRY_PARTS)
 
 
 @pytest.mark.parametrize("method", FREE_METHODS)

@@ -210,8 +210,7 @@ def test_the_disk_has_its_directions_within_the_half_angle_around_its_middle(cou
     middle = rays.mean(axis=0)
     middle /= np.linalg.norm(middle)
     off = np.linalg.norm(np.cross(middle, direction)) / HALF_ANGLE
-    # A sunflower's mean closes in on its middle like 1 / count.
-    assert off < 0.65 / count
+    assert off < ROUNDING
 
 
 def test_directions_fill_the_disk_evenly():

@@ -40,9 +40,14 @@ def disk_directions(direction: np.ndarray, half_angle: float, count: int) -> np.
     i = np.arange(count)
     # Equal steps of the cosine are equal solid angles.
     cosine = 1.0 - (1.0 - np.cos(half_angle)) * (i + 0.5) / count
-    sine = np.sqrt(1.0 - cosine**2)[:, None]
     turn = i * GOLDEN_ANGLE
-    return cosine[:, None] * direction + sine * (np.cos(turn)[:, None] * right + np.sin(turn)[:, None] * up)
+    across = np.sqrt(1.0 - cosine**2)[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    # A few seeds lean to one side: their middle is brought to the disk's, their spread kept.
+    spread = (across**2).sum()
+    across -= across.mean(axis=0)
+    across *= np.sqrt(spread / (across**2).sum())
+    along = np.sqrt(1.0 - (across**2).sum(axis=1))[:, None]
+    return along * direction + across[:, :1] * right + across[:, 1:] * up
 
 
 def refract_slopes(direction: np.ndarray, slopes: np.ndarray, ior: float) -> np.ndarray:
