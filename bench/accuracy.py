@@ -12,9 +12,8 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from oracle import CASES, load_reference, relative_l2
-
 import warp_caustics as wc
+from oracle import CASES, load_reference, relative_l2
 
 FRAMES = 5
 SETTINGS: dict[str, dict[str, object]] = {
