@@ -207,8 +207,6 @@ def test_what_crests_take_is_what_they_would_have_lit_twice(device, method):
 @pytest.mark.parametrize("self_shadow", [True, False])
 def test_a_hump_of_water_from_a_file_takes_no_more_than_comes(device, method, self_shadow, tmp_path):
     # A hump that is level at its border: through two metres by two comes |I_z| E, less what its neighbours shade.
-    if method == "beam" and not self_shadow:
-        pytest.skip("the waves above show it, and this would compile three kernels more")
     corner, size, zenith = (-1.0, -1.0), (2.0, 2.0), 75.0
     x, y = sample_points((64, 64), corner, size)
     hump = 0.2 * (1.0 - np.minimum((x**2 + y**2) / 0.6**2, 1.0)) ** 3
