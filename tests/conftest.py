@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import pytest
 import warp as wp
+from hypothesis import settings
 
 # Set before Warp initialises: its banner and its compile notes would drown the report of a failing test.
 wp.config.log_level = wp.LOG_WARNING
+
+# No test asserts a time, and by default each of hypothesis's examples would: a busy machine is no fault of the code.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 
 def _devices() -> list[str]:
