@@ -14,6 +14,7 @@ from warp_caustics.errors import InputError, RenderError, WarpCausticsError
 if TYPE_CHECKING:
     from warp_caustics.exr import load_map
     from warp_caustics.plan import Plan, make_plan
+    from warp_caustics.reference import Reference, make_reference
     from warp_caustics.renderer import Renderer, render
     from warp_caustics.result import Result
     from warp_caustics.scene import Scene, bundled_scenes, load_scene
@@ -23,6 +24,7 @@ __version__ = "0.1.0"
 __all__ = [
     "InputError",
     "Plan",
+    "Reference",
     "RenderError",
     "Renderer",
     "Result",
@@ -33,12 +35,14 @@ __all__ = [
     "load_map",
     "load_scene",
     "make_plan",
+    "make_reference",
     "render",
 ]
 
 # Public name -> the module that defines it.
 _HOMES = {
     "Plan": "plan",
+    "Reference": "reference",
     "Renderer": "renderer",
     "Result": "result",
     "Scene": "scene",
@@ -46,6 +50,7 @@ _HOMES = {
     "load_map": "exr",
     "load_scene": "scene",
     "make_plan": "plan",
+    "make_reference": "reference",
     "render": "renderer",
 }
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from .assets import HeightGrid
 
@@ -68,13 +68,34 @@ def node_spacing(grid: HeightGrid) -> np.ndarray:
 
 
 def surface_hull(grid: HeightGrid) -> Hull:
-    """Bound the surface between the nodes: a patch lies in the hull of its Bézier control points, its slope in theirs.
+    """Bound the surface between the nodes: a patch lies in the hull of its Bézier control points."""
+    lowest, highest = np.inf, -np.inf
+    for control, _, _ in _control_bands(grid):
+        lowest, highest = min(lowest, float(control.min())), max(highest, float(control.max()))
+    spare = ROUNDING * max(abs(lowest), abs(highest), 1.0)
+    return Hull(lowest - spare, highest + spare, float(patch_slopes(grid).max()))
+
+
+def patch_slopes(grid: HeightGrid) -> np.ndarray:
+    """Bound the slope of each patch ``[rows - 1, columns - 1]``.
 
     The control points of a cubic are (z0, z0 + m0/3, z1 - m1/3, z1), those of its slope three times their
-    differences. The outer patches reach half a node further, to the map's border.
+    differences, and the slope lies in their hull.
     """
-    nodes, spacing = hermite_nodes(grid.z), node_spacing(grid)
-    lowest, highest, slope = np.inf, -np.inf, 0.0
+    spacing, bands = node_spacing(grid), []
+    for control, wide, tall in _control_bands(grid):
+        along = 3.0 * np.abs(np.diff(control, axis=1)).max(axis=(0, 1)) / wide / spacing[0]
+        across = 3.0 * np.abs(np.diff(control, axis=0)).max(axis=(0, 1)) / tall / spacing[1]
+        bands.append(np.hypot(along, across) * (1.0 + ROUNDING))
+    return np.concatenate(bands)
+
+
+def _control_bands(grid: HeightGrid) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Yield control points of some rows of patches, and how wide and tall the patches are [nodes].
+
+    The outer patches reach half a node further, to the map's border.
+    """
+    nodes = hermite_nodes(grid.z)
     for first in range(0, len(nodes) - 1, BOUND_ROWS):
         control = _control_points(nodes[first : first + BOUND_ROWS + 1])
         wide, tall = np.ones(control.shape[3]), np.ones((control.shape[2], 1))
@@ -82,12 +103,7 @@ def surface_hull(grid: HeightGrid) -> Hull:
         upto = first + BOUND_ROWS >= len(nodes) - 1
         _reach_border(control, 0, (..., 0, slice(None)) if first == 0 else None,
                       (..., -1, slice(None)) if upto else None, tall)  # fmt: skip
-        along = 3.0 * np.abs(np.diff(control, axis=1)).max(axis=(0, 1)) / wide / spacing[0]
-        across = 3.0 * np.abs(np.diff(control, axis=0)).max(axis=(0, 1)) / tall / spacing[1]
-        slope = max(slope, float(np.hypot(along, across).max()))
-        lowest, highest = min(lowest, float(control.min())), max(highest, float(control.max()))
-    spare = ROUNDING * max(abs(lowest), abs(highest), 1.0)
-    return Hull(lowest - spare, highest + spare, slope * (1.0 + ROUNDING))
+        yield control, wide, tall
 
 
 def _reach_border(control: np.ndarray, axis: int, first: Any, last: Any, width: np.ndarray) -> None:

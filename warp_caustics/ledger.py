@@ -45,13 +45,13 @@ def read_energy(plan: Plan, ledgers: np.ndarray, caustic_map: np.ndarray, dry: n
     if plan.method == "gather":
         # The kernels book all that lands in the map.
         entries["missed_by_window"] = entries["missed_by_window"] - entries["received"]
-    beyond = _beyond_border(facts) * np.asarray(facts.irradiance)
+    beyond = beyond_border(facts) * np.asarray(facts.irradiance)
     entries["emitted"] = entries["emitted"] + beyond
     entries["missed_by_window"] = entries["missed_by_window"] + beyond
     return Energy(**{name: _plain(value) for name, value in entries.items()})
 
 
-def _beyond_border(facts: Facts) -> float:
+def beyond_border(facts: Facts) -> float:
     """Light at unit irradiance that would light the map, were it at rest, from beyond a height map's border [W]."""
     grid = facts.assets.water
     if grid is None:

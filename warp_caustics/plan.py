@@ -20,6 +20,8 @@ from .window import TOO_FAR
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from .reference.plan import ReferencePlan
+
 WAVE_BYTES, SUN_BYTES = 16, 20
 """Bytes of a wave and of a direction of the sun on the device."""
 
@@ -129,7 +131,7 @@ def make_plan(
     method: str | None = None,
     device: str | None = None,
     threads: int | None = None,
-) -> Plan:
+) -> Plan | ReferencePlan:
     """Plan a scene: which passes and buffers it needs, and why the others are left out.
 
     Nothing is compiled and nothing is allocated on a device.
@@ -148,6 +150,7 @@ def make_plan(
     Returns
     -------
     Plan
+        Or, for the method ``"reference"``, a ReferencePlan, which prints and counts alike.
 
     Raises
     ------
@@ -163,6 +166,10 @@ def make_plan(
     check_magnitudes(scene)
     check_map_fits(scene, device, free_memory(device))
     facts = gather_facts(scene, load_assets(scene))
+    if name == "reference":
+        from .reference.plan import ReferencePlan
+
+        return ReferencePlan(device, resolve_threads(threads, device), facts, facts.warnings)
     program = METHODS[name](facts)
     check_work(facts, program)
     lanes = min(resolve_threads(threads, device), program.strips * len(facts.suns)) if program.banded else 1

@@ -17,11 +17,12 @@ from .kernels.resolve import make_dry_land, make_resolve
 from .ledger import read_energy
 from .plan import Plan, make_plan
 from .result import Result
+from .scene import Scene, load_scene
 from .state import SceneState
-from .water import LONGEST_TIME
+from .water import check_time
 
 if TYPE_CHECKING:
-    from .scene import Scene
+    from .reference.renderer import ReferenceRenderer
 
 DTYPES: Mapping[str, Any] = {"float32": wp.float32, "vec1": FLUX[1], "vec2": wp.vec2, "vec3": FLUX[3],
                              "uint8": wp.uint8}  # fmt: skip
@@ -82,7 +83,10 @@ class Renderer:
         device: str | None = None,
         threads: int | None = None,
     ) -> None:
-        self.plan: Plan = make_plan(scene, method, device, threads)
+        plan = make_plan(scene, method, device, threads)
+        if not isinstance(plan, Plan):
+            raise InputError("method: a reference is converged anew for each frame; use warp_caustics.render(...)")
+        self.plan: Plan = plan
         self._state = SceneState(self.plan.facts, self.plan.device)
         self._allocate()
         start = perf_counter()
@@ -105,8 +109,7 @@ class Renderer:
         InputError
             If the time is not finite, or so late that the waves' phases are not known.
         """
-        if not abs(time) <= LONGEST_TIME:
-            raise InputError(f"time: expected a number of seconds up to {LONGEST_TIME:g} either way, got {time}")
+        check_time(time)
         start = perf_counter()
         self._state.write(time)
         if self._pool is None:
@@ -222,6 +225,28 @@ class Renderer:
             launch.launch()
 
 
+def make_renderer(
+    scene: Scene | str | os.PathLike[str],
+    method: str | None = None,
+    device: str | None = None,
+    threads: int | None = None,
+) -> Renderer | ReferenceRenderer:
+    """Make the renderer of a method: the reference has one of its own.
+
+    Raises
+    ------
+    InputError
+        As :func:`~warp_caustics.make_plan`.
+    """
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
+    if (method or scene.method.name) == "reference":
+        from .reference.renderer import ReferenceRenderer
+
+        return ReferenceRenderer(scene, device, threads)
+    return Renderer(scene, method, device, threads)
+
+
 def render(
     scene: Scene | str | os.PathLike[str],
     method: str | None = None,
@@ -249,6 +274,6 @@ def render(
     InputError
         As :func:`~warp_caustics.make_plan`.
     """
-    renderer = Renderer(scene, method, device, threads)
+    renderer = make_renderer(scene, method, device, threads)
     renderer.render(time)
     return renderer.result()

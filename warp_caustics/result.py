@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .assets import Assets
     from .energy import Energy
     from .plan import Plan
+    from .reference.plan import ReferencePlan
     from .scene import Scene
 
 UNITS = "unit of sun.irradiance"
@@ -50,18 +51,21 @@ class Result:
         Time of the frame, compilation apart.
     picture : None
         A deferred frame: not yet.
+    error_bar : float or None
+        Relative L2 error that a reference's map may have (RMSE over mean); None for the other methods.
     """
 
     scene: Scene
     method: str
     device: str
     time: float
-    plan: Plan
+    plan: Plan | ReferencePlan
     caustic_map: np.ndarray
     energy: Energy
     seconds: float
     assets: Assets = field(repr=False)
     picture: np.ndarray | None = None
+    error_bar: float | None = None
 
     @cached_property
     def surface_irradiance(self) -> np.ndarray | None:

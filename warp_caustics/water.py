@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .errors import InputError
 from .height_map import sample_heights, surface_hull
 
 if TYPE_CHECKING:
@@ -26,6 +27,18 @@ RADII = np.linspace(0.0, 1.0, 9)
 
 LONGEST_TIME = 1e9
 """Latest time [s], 32 years, at which a phase of float64 is still right to 1e-6 rad."""
+
+
+def check_time(time: float) -> None:
+    """Refuse a time that is not finite, or so late that phases are not known.
+
+    Raises
+    ------
+    InputError
+        With the time that it got.
+    """
+    if not abs(time) <= LONGEST_TIME:
+        raise InputError(f"time: expected a number of seconds up to {LONGEST_TIME:g} either way, got {time}")
 
 
 def angular_frequency(wavenumber: np.ndarray, depth: float) -> np.ndarray:

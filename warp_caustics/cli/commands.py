@@ -92,7 +92,7 @@ def render(
         check_writable(path)
 
     start_warp()
-    from warp_caustics.renderer import Renderer
+    from warp_caustics.renderer import make_renderer
     from warp_caustics.tone import value_limits
 
     interrupt = Interrupt()
@@ -100,7 +100,7 @@ def render(
     limits = None
     with interrupt.watch():
         with report.working("building kernels"):
-            renderer = Renderer(loaded, method=method, device=device, threads=threads)
+            renderer = make_renderer(loaded, method=method, device=device, threads=threads)
         for index in report.progress(frames or 1):
             renderer.render(time + index / fps)
             result = renderer.result()

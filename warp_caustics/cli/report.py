@@ -91,6 +91,8 @@ def print_result(
     mean = sum(milliseconds) / len(milliseconds)
     decimals = 1 if mean >= FEW_MILLISECONDS else 3
     table.add_row("time", f"{mean:,.{decimals}f} ms per frame, and {compile_seconds:.2f} s for kernels before")
+    if result.error_bar is not None:
+        table.add_row("error bar", f"{result.error_bar:.1e} relative L2")
     table.add_row("memory", f"{result.plan.bytes:,} bytes ({_mebibytes(result.plan.bytes)})")
     out = console()
     out.print(table)

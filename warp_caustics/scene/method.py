@@ -11,11 +11,11 @@ from pydantic_core import PydanticCustomError
 from warp_caustics.errors import InputError
 from warp_caustics.scene.faults import quoted
 from warp_caustics.scene.model import Model
-from warp_caustics.scene.values import COUNT, POSITIVE, Positive, Truth, one_of, that
+from warp_caustics.scene.values import COUNT, POSITIVE, Count, Positive, Truth, one_of, that
 
 #: The methods of this version, and those that later ones bring.
-METHODS: Final = ("beam", "photon", "gather")
-PLANNED_METHODS: Final = ("reference", "cascaded", "sample", "pattern", "area_ratio", "differential")
+METHODS: Final = ("beam", "photon", "gather", "reference")
+PLANNED_METHODS: Final = ("cascaded", "sample", "pattern", "area_ratio", "differential")
 
 
 METHOD_NAME: Final = one_of(*METHODS, not_yet=PLANNED_METHODS)
@@ -69,6 +69,17 @@ class GatherSettings(Model):
     )
 
 
+class ReferenceSettings(Model):
+    """`[method.reference]`: the converged answer, in float64."""
+
+    tolerance: Positive = Field(
+        default=1e-4, description="relative L2 difference of two levels at which they are taken as converged"
+    )
+    rays: Count = Field(
+        default=2**26, description="rays of a level at most; past them the error bar stays above the tolerance"
+    )
+
+
 class Method(Model):
     """The method and its parameters; the tables of other methods are validated and unused."""
 
@@ -81,3 +92,4 @@ class Method(Model):
     beam: BeamSettings = Field(default=BeamSettings(), description="parameters of beam")
     photon: PhotonSettings = Field(default=PhotonSettings(), description="parameters of photon")
     gather: GatherSettings = Field(default=GatherSettings(), description="parameters of gather")
+    reference: ReferenceSettings = Field(default=ReferenceSettings(), description="parameters of reference")

@@ -1,0 +1,185 @@
+"""The converged caustic map that methods are judged by: float64, and no kernel of theirs."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..assets import load_assets
+from ..device import resolve_device, resolve_threads
+from ..energy import Energy
+from ..errors import InputError
+from ..facts import gather_facts
+from ..ledger import beyond_border
+from ..magnitude import check_magnitudes
+from ..scene import Scene, load_scene
+from ..water import check_time
+from . import cache as disk
+from .converge import Budget, Level, converge, relative_l2
+from .roads import Roads
+
+if TYPE_CHECKING:
+    from ..facts import Facts
+
+__all__ = ["Reference", "jittered_photons", "make_reference", "relative_l2"]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A converged caustic map, and how wrong it may be.
+
+    Attributes
+    ----------
+    caustic_map : ndarray
+        float64 ``[rows, columns]`` or ``[rows, columns, 3]``, in the units of ``sun.irradiance``.
+    energy : Energy
+        Its ledger [W].
+    error_bar : float
+        Relative L2 error (RMSE over mean) that it may have: by how much its last two levels differ.
+    samples : float
+        Cells per pixel of the last level, all directions of the sun's disk together.
+    seconds : float
+        It took to compute.
+    cached : bool
+        Whether it was read from the disk.
+    """
+
+    caustic_map: np.ndarray
+    energy: Energy
+    error_bar: float
+    samples: float
+    seconds: float
+    cached: bool
+
+
+def make_reference(
+    scene: Scene | str | os.PathLike[str],
+    time: float = 0.0,
+    *,
+    tolerance: float | None = None,
+    device: str | None = None,
+    threads: int | None = None,
+    cache: bool = True,
+) -> Reference:
+    """Compute the converged caustic map of a scene, or read it from the disk.
+
+    A mesh of the water is refracted and each landed triangle clipped to its pixels; the mesh is made twice as fine
+    until two answers agree. Cells that an edge of light and shadow cuts, and all that light a mesh, are followed ray by
+    ray instead. Everything is float64, by kernels that no method shares (``kernels/reference``);
+    :func:`jittered_photons` is a second road to the same map.
+
+    Parameters
+    ----------
+    scene : Scene, str or path
+        A scene, the name of a bundled one, or a file. Its method and camera do not matter.
+    time : float
+        [s].
+    tolerance : float, optional
+        Relative L2 difference at which to stop; the scene's ``method.reference.tolerance`` if not given.
+    device, threads
+        As for :func:`~warp_caustics.make_plan`.
+    cache : bool
+        Read the answer from the disk if it is there, and leave it there if it is not. It is named by the content of
+        the scene and its files, the time, the tolerance and the reference's own code.
+
+    Returns
+    -------
+    Reference
+        Its ``error_bar`` may be above the tolerance, when rays run out.
+
+    Raises
+    ------
+    InputError
+        If the scene, device, threads, time or tolerance cannot be used.
+    """
+    facts, device, threads = _prepared(scene, time, device, threads)
+    settings = facts.scene.method.reference
+    budget = Budget(settings.tolerance if tolerance is None else tolerance, settings.rays)
+    if not budget.tolerance > 0.0:
+        raise InputError(f"tolerance: expected a number above 0, got {tolerance}")
+    name = disk.key(facts, time, budget)
+    stored = disk.load(name) if cache else None
+    if stored is not None:
+        return Reference(
+            caustic_map=stored["caustic_map"], energy=disk.unpack_energy(stored), error_bar=float(stored["error_bar"]),
+            samples=float(stored["samples"]), seconds=float(stored["seconds"]), cached=True,
+        )  # fmt: skip
+    start = perf_counter()
+    roads = Roads(facts, time, device, threads)
+    land = roads.land()
+    level = converge(roads, facts, budget, land)
+    made = _reference(facts, level, land, perf_counter() - start)
+    if cache:
+        disk.store(
+            name,
+            {"caustic_map": made.caustic_map, "error_bar": np.asarray(made.error_bar),
+             "samples": np.asarray(made.samples), "seconds": np.asarray(made.seconds), **disk.pack_energy(made.energy)},
+        )  # fmt: skip
+    return made
+
+
+def jittered_photons(
+    scene: Scene | str | os.PathLike[str],
+    time: float = 0.0,
+    *,
+    per_side: int,
+    seed: int = 0,
+    device: str | None = None,
+    threads: int | None = None,
+) -> np.ndarray:
+    """Compute a caustic map by the reference's second road alone: a photon from a random place of each cell.
+
+    Parameters
+    ----------
+    scene, time, device, threads
+        As for :func:`make_reference`.
+    per_side : int
+        Photons along a pixel's side.
+    seed : int
+        Of the random places; maps of different seeds are independent.
+
+    Returns
+    -------
+    ndarray
+        float64 ``[rows, columns]`` or ``[rows, columns, 3]``.
+    """
+    facts, device, threads = _prepared(scene, time, device, threads)
+    roads = Roads(facts, time, device, threads)
+    return _map(facts, roads.photons(per_side, seed).flux, roads.land())
+
+
+def _prepared(
+    scene: Scene | str | os.PathLike[str],
+    time: float,
+    device: str | None,
+    threads: int | None,
+) -> tuple[Facts, str, int]:
+    if not isinstance(scene, Scene):
+        scene = load_scene(scene)
+    check_time(time)
+    device = resolve_device(device)
+    check_magnitudes(scene)
+    return gather_facts(scene, load_assets(scene)), device, resolve_threads(threads, device)
+
+
+def _reference(facts: Facts, level: Level, land: np.ndarray, seconds: float) -> Reference:
+    caustic_map = _map(facts, level.sums.flux, land)
+    colours, area = np.asarray(facts.irradiance), float(np.prod(facts.pixel))
+    entries = {name: value * colours for name, value in level.sums.ledger.items()}
+    beyond = beyond_border(facts) * colours
+    entries["emitted"] = entries["emitted"] + beyond
+    entries["missed_by_window"] = beyond
+    entries["dry"] = land.sum() * area * colours
+    energy = Energy(**{name: float(value[0]) if len(colours) == 1 else value for name, value in entries.items()})
+    samples = float(level.per_side**2 * max(level.directions, 1))
+    return Reference(caustic_map, energy, level.error_bar, samples, seconds, False)
+
+
+def _map(facts: Facts, flux: np.ndarray, land: np.ndarray) -> np.ndarray:
+    columns, rows = facts.scene.map.resolution
+    caustic_map = (flux / float(np.prod(facts.pixel)) + land[..., None]) * np.asarray(facts.irradiance)
+    return caustic_map.reshape(rows, columns, 3) if len(facts.irradiance) == 3 else caustic_map.reshape(rows, columns)
