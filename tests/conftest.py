@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 import warp as wp
 from hypothesis import settings
+
+from warp_caustics.reference.cache import FOLDER_VARIABLE
 
 # Set before Warp initialises: its banner and its compile notes would drown the report of a failing test.
 wp.config.log_level = wp.LOG_WARNING
@@ -23,3 +27,11 @@ def _devices() -> list[str]:
 def device(request: pytest.FixtureRequest) -> str:
     """Name of a device; a test that takes it runs once on each device present."""
     return str(request.param)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def reference_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """References are kept in a folder of this run, not in the user's."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(FOLDER_VARIABLE, str(tmp_path_factory.mktemp("references")))
+        yield

@@ -94,6 +94,16 @@ def last_pixel(high: wp.float64, count: int) -> int:
     return int(wp.clamp(wp.floor(high) + wp.float64(1.0), wp.float64(0.0), wp.float64(count)))
 
 
+@wp.func
+def in_one_pixel(low: wp.vec2d, high: wp.vec2d, size: wp.vec2i) -> bool:
+    """Whether a box lies within a single pixel of the map."""
+    zero = wp.float64(0.0)
+    return (
+        low[0] >= zero and low[1] >= zero and wp.floor(low[0]) == wp.floor(high[0])
+        and wp.floor(low[1]) == wp.floor(high[1]) and high[0] < wp.float64(size[0]) and high[1] < wp.float64(size[1])
+    )  # fmt: skip
+
+
 @functools.cache
 def make_add_flux(channels: int) -> wp.Function:
     """Add a flux by channel to one pixel."""
@@ -133,10 +143,15 @@ def make_deposit_triangle(channels: int) -> wp.Function:
     ) -> wp.float64:
         zero = wp.float64(0.0)
         one = wp.float64(1.0)
-        left = first_pixel(wp.min(a[0], wp.min(b[0], c[0])), size[0])
-        right = last_pixel(wp.max(a[0], wp.max(b[0], c[0])), size[0])
-        bottom = first_pixel(wp.min(a[1], wp.min(b[1], c[1])), size[1])
-        top = last_pixel(wp.max(a[1], wp.max(b[1], c[1])), size[1])
+        low = wp.min(a, wp.min(b, c))
+        high = wp.max(a, wp.max(b, c))
+        if in_one_pixel(low, high, size):
+            add_flux(map, int(low[1]) * size[0] + int(low[0]), flux, one)
+            return one
+        left = first_pixel(low[0], size[0])
+        right = last_pixel(high[0], size[0])
+        bottom = first_pixel(low[1], size[1])
+        top = last_pixel(high[1], size[1])
         whole = Polygon()
         whole.count = 3
         whole.x[0] = a[0]
@@ -174,20 +189,14 @@ def make_deposit_quad(channels: int) -> wp.Function:
         """Corners in order around the cell."""
         low = wp.min(wp.min(a, b), wp.min(c, d))
         high = wp.max(wp.max(a, b), wp.max(c, d))
-        left = wp.floor(low[0])
-        bottom = wp.floor(low[1])
         if (
             high[0] < wp.float64(0.0) or low[0] > wp.float64(size[0])
             or high[1] < wp.float64(0.0) or low[1] > wp.float64(size[1])
         ):  # fmt: skip
             return wp.float64(0.0)
         # Most cells of a fine lattice land within one pixel.
-        if (
-            high[0] <= left + wp.float64(1.0) and high[1] <= bottom + wp.float64(1.0)
-            and low[0] >= wp.float64(0.0) and left < wp.float64(size[0])
-            and low[1] >= wp.float64(0.0) and bottom < wp.float64(size[1])
-        ):  # fmt: skip
-            add_flux(map, int(bottom) * size[0] + int(left), flux, wp.float64(1.0))
+        if in_one_pixel(low, high, size):
+            add_flux(map, int(low[1]) * size[0] + int(low[0]), flux, wp.float64(1.0))
             return wp.float64(1.0)
         half = wp.float64(0.5) * flux
         return wp.float64(0.5) * (
