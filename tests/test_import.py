@@ -30,15 +30,14 @@ OUTER = {"warp_caustics.__main__", "warp_caustics.cli", "warp_caustics.view"}
 
 
 def _module(path: Path) -> str:
-    """Name of the module of a file of the package."""
-    return ".".join(["warp_caustics", *path.relative_to(PACKAGE).with_suffix("").parts]).removesuffix(".__init__")
+    """Name of the module of a file of the package, or of its device code."""
+    root, package = (KERNELS, "warp_caustics.kernels") if path.is_relative_to(KERNELS) else (PACKAGE, "warp_caustics")
+    return ".".join([package, *path.relative_to(root).with_suffix("").parts]).removesuffix(".__init__")
 
 
 FILES = sorted(PACKAGE.rglob("*.py"))
-MODULES = [
-    *(_module(path) for path in FILES),
-    *(f"warp_caustics.kernels.{path.stem}" for path in KERNELS.glob("*.py") if path.stem != "__init__"),
-]
+KERNEL_FILES = sorted(KERNELS.rglob("*.py"))
+MODULES = [_module(path) for path in (*FILES, *KERNEL_FILES)]
 
 # Runs in a fresh process: what is loaded and which settings change, by an import of the package and of all its modules.
 PROBE = """
@@ -122,7 +121,7 @@ def test_the_wheel_holds_every_package_and_data_file():
     """An editable install does not show what a wheel would lack."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["setuptools"]
     listed = set(settings["packages"])
-    assert listed == {_module(path) for path in FILES if path.name == "__init__.py"} | {"warp_caustics.kernels"}
+    assert listed == {_module(path) for path in (*FILES, *KERNEL_FILES) if path.name == "__init__.py"}
     patterns = settings["package-data"]["warp_caustics.scenes"]
     for path in (PACKAGE / "scenes").iterdir():
         assert path.suffix == ".py" or path.is_dir() or any(path.match(pattern) for pattern in patterns), path.name
@@ -133,9 +132,10 @@ def test_an_unknown_name_is_an_attribute_error():
         wc.no_such_name  # noqa: B018
 
 
-@pytest.mark.parametrize("path", sorted(KERNELS.glob("*.py")), ids=lambda path: path.name)
+@pytest.mark.parametrize("path", KERNEL_FILES, ids=lambda path: str(path.relative_to(KERNELS)))
 def test_kernels_know_warp_alone(path):
-    for name in _imports(path, "warp_caustics.kernels"):
+    package = _module(path) if path.name == "__init__.py" else _module(path).rpartition(".")[0]
+    for name in _imports(path, package):
         assert name.startswith("warp_caustics.kernels") or name.partition(".")[0] in KERNEL_IMPORTS, name
 
 
