@@ -7,6 +7,7 @@ import warp as wp
 from .deposit import ACCUMULATOR
 from .optics import facing
 from .photon import Scene, SunSample, share_lit
+from .project import FAR, Receiver, make_clearance
 from .spec import Spec
 from .surface import HEIGHT_AND_SLOPE
 
@@ -45,9 +46,12 @@ def make_resolve(accumulate: str, channels: int, colours: int) -> wp.Kernel:
 
 @functools.cache
 def make_dry_land(spec: Spec) -> wp.Kernel:
-    """Light dry land directly: E max(0, -I_z + z_x I_x + z_y I_y) on the part of a pixel that is dry."""
+    """Light dry land directly: E max(0, -I_z + z_x I_x + z_y I_y) on the part of a pixel that is dry and in the sun."""
     water_at = HEIGHT_AND_SLOPE[spec.water]
-    terrain_at = HEIGHT_AND_SLOPE[spec.receiver if spec.receiver in HEIGHT_AND_SLOPE else "waves"]
+    kind = spec.receiver if spec.receiver in HEIGHT_AND_SLOPE else "waves"
+    terrain_at = HEIGHT_AND_SLOPE[kind]
+    clear_of_land = make_clearance(kind)
+    hills_shade = spec.hills_shade
 
     @wp.func
     def dry_share(scene: Scene, at: wp.vec2, size: wp.vec2) -> float:
@@ -59,6 +63,17 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
             return 1.0
         water = water_at(scene.water.surface, at[0], at[1])
         return share_lit(ground[0] - water[0], wp.vec2(ground[1] - water[1], ground[2] - water[2]), size)
+
+    @wp.func
+    def sunlit_share(land: Receiver, sun: wp.vec3, at: wp.vec2, size: wp.vec2) -> float:
+        """Share of a pixel that no hill shades: one ray from its middle, whose edge of shadow is filtered."""
+        ground = terrain_at(land.terrain, at[0], at[1])
+        origin = wp.vec3(at[0], at[1], ground[0])
+        near = clear_of_land(land.terrain, origin, -sun, 1.0, land.slope, land.highest, land.step)
+        if near[0] >= FAR:
+            return 1.0
+        hill = terrain_at(land.terrain, origin[0] - near[1] * sun[0], origin[1] - near[1] * sun[1])
+        return share_lit(near[0], wp.vec2(ground[1] - hill[1], ground[2] - hill[2]), size)
 
     @wp.kernel(module="unique", enable_backward=False)
     def dry_land(
@@ -83,18 +98,23 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
         parts = int(wp.static(DRY_PARTS))  # a variable, so that the loops are not unrolled
         part = pixel / float(parts)
         light = float(0.0)
-        for j in range(parts):
-            for i in range(parts):
-                x = float(column) * pixel[0] + (float(i) + 0.5) * part[0]
-                y = float(row) * pixel[1] + (float(j) + 0.5) * part[1]
-                dry = float(1.0)
-                if share < 1.0:
-                    dry = dry_share(scene, wp.vec2(x, y), part)
-                if dry > 0.0:
-                    ground = terrain_at(scene.receiver.terrain, x, y)
-                    for k in range(suns.shape[0]):
-                        sun = suns[k].direction
-                        light += dry * wp.max(0.0, facing(sun, wp.vec2(ground[1], ground[2])))
+        for k in range(suns.shape[0]):
+            sun = suns[k].direction
+            direct = float(0.0)
+            for j in range(parts):
+                for i in range(parts):
+                    x = float(column) * pixel[0] + (float(i) + 0.5) * part[0]
+                    y = float(row) * pixel[1] + (float(j) + 0.5) * part[1]
+                    dry = float(1.0)
+                    if share < 1.0:
+                        dry = dry_share(scene, wp.vec2(x, y), part)
+                    if dry > 0.0:
+                        ground = terrain_at(scene.receiver.terrain, x, y)
+                        direct += dry * wp.max(0.0, facing(sun, wp.vec2(ground[1], ground[2])))
+            if wp.static(hills_shade):
+                if direct > 0.0:
+                    direct *= sunlit_share(scene.receiver, sun, middle, pixel)
+            light += direct
         light /= float(wp.static(DRY_PARTS)) * float(wp.static(DRY_PARTS))
         if light > 0.0:
             for c in range(colours):

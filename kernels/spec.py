@@ -19,6 +19,8 @@ class Spec:
         The water ends at the border of its height map: cells are clipped to it.
     shore : bool
         The receiver may rise above the water: wet and dry, and land that shades water.
+    hills_shade : bool
+        Parts of the terrain face away from the sun, so that hills shade dry land: a march towards the sun.
     occluders : bool
         A mesh may rise above the water: its shadow on the water by BVH.
     self_shadow : bool
@@ -46,6 +48,7 @@ class Spec:
     objects: bool = False
     bounded: bool = False
     shore: bool = False
+    hills_shade: bool = False
     occluders: bool = False
     self_shadow: bool = False
     faces_away: bool = False

@@ -224,7 +224,8 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
         ({"medium": {"ior": 1.3, "fresnel": 1}}, "medium.fresnel: expected true or false, got 1"),
         (
             {"method": {"name": "gahter"}},
-            'method.name: expected one of "beam", "photon", "gather" or "reference", got "gahter": did you mean "gather"?',
+            'method.name: expected one of "beam", "photon", "gather" or "reference", '
+            'got "gahter": did you mean "gather"?',
         ),
         (
             {"method": {"photon": {"footprint": -1.0}}},

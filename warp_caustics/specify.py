@@ -60,6 +60,8 @@ def specify(scene: Scene, assets: Assets, light: Light, ground: Bounds) -> Spec:
     faces_away = bool((light.slopes @ light.suns[:, :2].T - light.suns[:, 2] < 0.0).any())
     meshes = [mesh for mesh in (assets.mesh, assets.objects) if mesh is not None]
     top = max((float(mesh.vertices[:, 2].max()) - scene.water.level for mesh in meshes), default=-np.inf)
+    shore = height_field and bool(ground.highest > -light.amplitude)
+    across = np.linalg.norm(light.suns[:, :2], axis=1)
     by_depth = medium.jerlov is not None
     absorbs = by_depth or bool(np.any(medium.absorption))
     return Spec(
@@ -67,7 +69,8 @@ def specify(scene: Scene, assets: Assets, light: Light, ground: Bounds) -> Spec:
         receiver=kind,
         objects=assets.objects is not None,
         bounded=assets.water is not None,
-        shore=height_field and bool(ground.highest > -light.amplitude),
+        shore=shore,
+        hills_shade=shore and bool((ground.slope * across > -light.suns[:, 2]).any()),
         occluders=bool(top > -light.amplitude),
         self_shadow=faces_away and scene.water.self_shadow is not False,
         faces_away=faces_away,
@@ -93,6 +96,12 @@ def reasons(scene: Scene, spec: Spec, suns: int) -> tuple[Reason, ...]:
         ("exit through the surface", spec.exits, "a ray may meet a crest from below", "no ray is flat enough for it"),
         ("march over terrain", height_field, "receiver.terrain", f"the receiver is a {spec.receiver}"),
         ("shore", spec.shore, "land may rise above the water", "no land near the surface"),
+        (
+            "shade on dry land",
+            spec.hills_shade,
+            "hills face away from the sun",
+            "no hill is as steep as the sun's rays",
+        ),
         ("torn cells", spec.breaks, "a cell's corners may meet different fates", "neighbouring rays stay neighbours"),
         ("BVH", meshes, "meshes in the scene", "no meshes"),
         ("sun's disk", suns > 1, f"{suns} directions share the flux", "one direction: its disk is a point"),
