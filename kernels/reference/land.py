@@ -63,12 +63,14 @@ def make_land(spec: Spec) -> wp.Kernel:
         # In:
         world: World,
         suns: wp.array[wp.vec3d],
+        first_row: int,
         columns: int,
         # Out:
         map_out: wp.array[wp.float64],
     ):
-        """One thread a pixel; launch dims (rows, columns). A pixel is looked at in parts, a shore's in more."""
-        row, column = wp.tid()
+        """One thread a pixel; launch dims (rows of a band, columns). A shore's pixel is looked at in more parts."""
+        band_row, column = wp.tid()
+        row = first_row + band_row
         parts = int(wp.static(PARTS))
         dry = dry_parts(world, row, column, parts)
         if dry == 0:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 STRIP_CORNERS = 2**17
 """Corners worked on at a time: a few megabytes."""
 
+LAND_ROWS = 16
+"""Rows of pixels of a job in which land is looked at."""
+
 SEEDS_APART = 2**20
 """Between the seeds of two maps: more than there are rows of photons."""
 
@@ -98,7 +101,13 @@ class Roads:
             return np.zeros((rows, columns))
         made = wp.zeros(rows * columns, dtype=wp.float64, device=self._device)
         suns: wp.array = wp.array(facts.suns, dtype=wp.vec3d, device=self._device)
-        self._launch(make_land(facts.spec), (rows, columns), [self._owner.world, suns, columns, made])
+        kernel = make_land(facts.spec)
+
+        def light(first: int, own: None) -> None:
+            band = min(LAND_ROWS, rows - first)
+            self._launch(kernel, (band, columns), [self._owner.world, suns, first, columns, made])
+
+        self._share(list(range(0, rows, LAND_ROWS)), lambda: None, light)
         return np.asarray(made.numpy()).reshape(rows, columns) * facts.sun_share
 
     def _walk(
@@ -115,23 +124,33 @@ class Roads:
         lanes = min(self._threads, len(jobs))
         maps = wp.zeros((lanes, rows * columns * channels), dtype=wp.float64, device=self._device)
         ledgers = wp.zeros((lanes, len(ENTRIES) * channels, BINS), dtype=wp.float64, device=self._device)
+        free = list(range(lanes))
+        self._share(
+            jobs,
+            lambda: (free.pop(), allocate()),
+            lambda job, own: walk(job, own[1], maps[own[0]], ledgers[own[0]]),
+        )
+        sums = ledgers.numpy().sum(axis=(0, 2)).reshape(len(ENTRIES), channels) * share
+        flux = maps.numpy().sum(axis=0).reshape(rows, columns, channels) * share
+        return Sums(flux, dict(zip(ENTRIES, sums, strict=True)))
+
+    def _share(self, jobs: list[Any], prepare: Callable[[], Any], work: Callable[[Any, Any], None]) -> None:
+        """Do jobs on all threads, each with what it prepares for itself; Ctrl-C ends them after the job in hand."""
+        lanes = min(self._threads, len(jobs))
 
         def run(lane: int) -> None:
-            own = allocate()
+            own = prepare()
             for job in jobs[lane::lanes]:
                 if self._stop.is_set():
                     return
-                walk(job, own, maps[lane], ledgers[lane])
+                work(job, own)
 
         with ThreadPoolExecutor(lanes) as pool:
             try:
                 list(pool.map(run, range(lanes)))
             except BaseException:
-                self._stop.set()  # Ctrl-C: the threads end after their strip
+                self._stop.set()
                 raise
-        sums = ledgers.numpy().sum(axis=(0, 2)).reshape(len(ENTRIES), channels) * share
-        flux = maps.numpy().sum(axis=0).reshape(rows, columns, channels) * share
-        return Sums(flux, dict(zip(ENTRIES, sums, strict=True)))
 
     def _launch(self, kernel: wp.Kernel, dim: tuple[int, ...], arguments: list[Any]) -> None:
         wp.launch(kernel, dim=dim, inputs=arguments, device=self._device)
