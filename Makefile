@@ -6,11 +6,12 @@ OUT := out
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint clean
+.PHONY: help demo test bench lint clean
 
 help:
 	@echo "make demo   render the bundled beach into $(OUT)/"
 	@echo "make test   run the whole test suite"
+	@echo "make bench  measure error, time and memory into bench/results/, some minutes"
 	@echo "make lint   ruff and mypy"
 	@echo "make clean  remove what the other targets made, except $(VENV)/"
 
@@ -20,6 +21,11 @@ demo: $(VENV)/.installed
 
 test: $(VENV)/.installed-test
 	$(BIN)/python -m pytest
+
+bench: $(VENV)/.installed-test
+	$(BIN)/python bench/compare_scenes.py
+	$(BIN)/python -m pytest bench --benchmark-only \
+	  --benchmark-json="$$($(BIN)/python bench/compare_scenes.py --folder)/frames.json"
 
 lint: $(VENV)/.installed-lint
 	$(BIN)/ruff check .

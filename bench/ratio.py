@@ -32,6 +32,7 @@ from ratio_pictures import Panel, draw_curves, draw_maps
 
 import warp_caustics as wc
 from warp_caustics.device import resolve_threads
+from warp_caustics.metrics import relative_l2
 from warp_caustics.reference import Reference, make_reference
 
 FRAMES = 5  # warm ones, of which the median counts
@@ -65,12 +66,6 @@ def pool(resolution: int, fresnel: bool) -> dict[str, Any]:
     return table
 
 
-def relative_l2(found: np.ndarray, reference: Reference) -> float:
-    """Give the root mean square difference over the reference's mean."""
-    difference = found.astype(np.float64) - reference.caustic_map
-    return float(np.sqrt(np.mean(difference**2)) / reference.caustic_map.mean())
-
-
 def measure(table: dict[str, Any], reference: Reference, label: tuple[str, str], threads: int, **method: Any) -> Point:
     """Render a setting once cold, and warm some times."""
     renderer = wc.Renderer(wc.Scene(**{**table, "method": method}), device="cpu", threads=threads)
@@ -82,7 +77,7 @@ def measure(table: dict[str, Any], reference: Reference, label: tuple[str, str],
         seconds.append(result.seconds)
     print(f"{label[0]}, {label[1]} a pixel: {statistics.median(seconds):.3g} s", file=sys.stderr)
     spread = 0.5 * (max(seconds) - min(seconds))
-    return Point(*label, relative_l2(result.caustic_map, reference), statistics.median(seconds), spread)
+    return Point(*label, relative_l2(result.caustic_map, reference.caustic_map), statistics.median(seconds), spread)
 
 
 def beam_points(table: dict[str, Any], reference: Reference, threads: int) -> Iterator[Point]:
@@ -118,7 +113,7 @@ def trace_peer(
     batch, spread = float(np.median(found.seconds)), 0.5 * float(np.ptp(found.seconds))
     points = []
     for count in (2**k for k in range(run.batches.bit_length())):
-        error = relative_l2(found.batches[:count].mean(axis=0), reference)
+        error = relative_l2(found.batches[:count].mean(axis=0), reference.caustic_map)
         points.append(Point("Mitsuba ptracer", f"{count * PEER_SAMPLES:g}", error, count * batch, count * spread))
     truth = reference.caustic_map
     gradient = np.hypot(*np.gradient(truth, peer.setting.pixel[1], peer.setting.pixel[0]))

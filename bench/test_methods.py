@@ -1,34 +1,65 @@
-"""A warm frame of each method on each bundled scene that it can serve: ``pytest bench --benchmark-only``."""
+"""A warm frame of each method on each scene, checked before it is timed: ``pytest bench --benchmark-only``."""
 
 from __future__ import annotations
 
 import pytest
+from scenes import SCENES
 
 import warp_caustics as wc
+from warp_caustics.metrics import energy_error, relative_l2
+from warp_caustics.reference import make_reference
 
 # A frame is timed only if its ledger adds up: rounding of float32 sums over a map.
 LEDGER = 1e-5
 
+# And only if its map is near the reference, on a small map, whose reference takes seconds. The bounds hold the worst of
+# the bundled scenes with a third to spare, on pixels as coarse as their shortest waves: they catch a method that is
+# broken, not one that is a bit worse.
+CHECKED_PIXELS = 64
+MOST_ERROR = {"beam": 0.06, "photon": 0.15, "gather": 0.3}
+
 RUNS = [
     (scene, method)
-    for scene in wc.bundled_scenes()
+    for scene in SCENES
     for method in ("beam", "photon", "gather")
     if method != "gather" or scene == "pool"
 ]
 
 
-@pytest.mark.parametrize(("scene", "method"), RUNS)
-def test_frame(benchmark, scene: str, method: str) -> None:
-    renderer = wc.Renderer(scene, method=method)
+@pytest.fixture(scope="module")
+def references() -> dict[str, tuple[wc.Scene, object]]:
+    """Small scenes and their references, each made once."""
+    return {}
+
+
+@pytest.mark.parametrize(("name", "method"), RUNS)
+def test_frame(benchmark, references, name: str, method: str) -> None:
+    if name not in references:
+        small = SCENES[name].at_resolution(CHECKED_PIXELS, CHECKED_PIXELS)
+        references[name] = (small, make_reference(small))
+    small, reference = references[name]
+    checked = wc.render(small, method=method)
+    error = relative_l2(checked.caustic_map, reference.caustic_map)
+    assert checked.energy.unaccounted < LEDGER
+    assert error < MOST_ERROR[method]
+
+    renderer = wc.Renderer(SCENES[name], method=method)
     renderer.render(0.0)
     result = renderer.result()
     assert result.energy.unaccounted < LEDGER
 
     benchmark.pedantic(lambda: (renderer.render(0.0), renderer.result()), rounds=5, warmup_rounds=1)
+    median = benchmark.stats["median"]
+    cells = renderer.plan.program.lattice.cells * len(renderer.plan.facts.suns)
     benchmark.extra_info.update(
         device=result.device,
         threads=renderer.plan.threads,
+        pixels=SCENES[name].map.resolution,
+        error=error,
+        error_pixels=(CHECKED_PIXELS, CHECKED_PIXELS),
+        error_bar=reference.error_bar,
+        energy_error=energy_error(checked.energy, reference.energy),
         bytes=renderer.plan.bytes,
-        cells_per_second=renderer.plan.program.lattice.cells / benchmark.stats["median"],
+        cells_per_second=cells / median,
         compile_seconds=renderer.compile_seconds,
     )

@@ -1,17 +1,16 @@
-"""Render the same water by every method that takes its receiver, and compare where the light went."""
-
-import numpy as np
+"""Measure every method on one scene: how wrong it is, how long it takes, and which settings no other one beats."""
 
 import warp_caustics as wc
 
-scene = wc.load_scene("pool")
-results = {method: wc.render(scene, method=method) for method in ("beam", "photon", "gather")}
-reference = results["beam"].caustic_map
+scene = wc.load_scene("pool").at_resolution(128, 128)
+comparison = wc.compare(scene)  # methods=["beam", "gather"], device="cpu", threads=1, time=0.5, ... if wanted
 
-print(f"{'method':8} {'ms':>8} {'received':>10} {'missed':>10} {'difference from beam':>22}")
-for method, result in results.items():
-    energy = result.energy
-    difference = np.sqrt(np.mean((result.caustic_map - reference) ** 2)) / reference.mean()
-    received = energy["received"] / energy["emitted"]
-    missed = (energy["missed_by_window"] + energy["dropped"]) / energy["emitted"]
-    print(f"{method:8} {1e3 * result.seconds:8.2f} {received:10.4%} {missed:10.4%} {difference:22.4f}")
+print(f"errors are known to {comparison.reference.error_bar:.1e}, the error bar of the reference")
+print(f"{'setting':22} {'ms':>8} {'error':>10} {'energy error':>13} {'bytes':>12}")
+for row in comparison.front:  # fastest first; comparison.rows has them all
+    print(
+        f"{row.label:22} {row.speed.milliseconds:8.2f} {row.errors.relative_l2:10.4%} "
+        f"{row.errors.energy_error:+13.1e} {row.speed.bytes:12,}"
+    )
+for path in comparison.save("out/compare_pool"):  # compare.json and compare.png
+    print(path)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from warp_caustics.errors import InputError, RenderError, WarpCausticsError
 
 if TYPE_CHECKING:
+    from warp_caustics.comparison import Comparison, compare
     from warp_caustics.exr import load_map
     from warp_caustics.plan import Plan, make_plan
     from warp_caustics.reference import Reference, make_reference
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "Comparison",
     "InputError",
     "Plan",
     "Reference",
@@ -32,6 +34,7 @@ __all__ = [
     "WarpCausticsError",
     "__version__",
     "bundled_scenes",
+    "compare",
     "load_map",
     "load_scene",
     "make_plan",
@@ -41,12 +44,14 @@ __all__ = [
 
 # Public name -> the module that defines it.
 _HOMES = {
+    "Comparison": "comparison",
     "Plan": "plan",
     "Reference": "reference",
     "Renderer": "renderer",
     "Result": "result",
     "Scene": "scene",
     "bundled_scenes": "scene",
+    "compare": "comparison",
     "load_map": "exr",
     "load_scene": "scene",
     "make_plan": "plan",

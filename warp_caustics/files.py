@@ -79,6 +79,33 @@ def check_writable(path: str | os.PathLike[str]) -> None:
             temporary.unlink(missing_ok=True)
 
 
+def check_folder(folder: str | os.PathLike[str], *names: str) -> None:
+    """Make sure, before long work starts, that files can be written into a folder, which need not exist yet.
+
+    Parameters
+    ----------
+    folder
+        Where to.
+    names
+        Of the files.
+
+    Raises
+    ------
+    InputError
+        It is no folder, it or one of the files cannot be written, or it could not be made.
+    """
+    there = Path(folder)
+    if there.is_dir():
+        for name in names:
+            check_writable(there / name)
+        return
+    while not there.parent.exists():
+        there = there.parent
+    if there.exists() or there.is_symlink():
+        raise InputError(f"cannot write into {os.fspath(folder)!r}: {str(there)!r} is not a folder")
+    check_writable(there)
+
+
 def is_sequence(pattern: str | os.PathLike[str]) -> bool:
     """Tell whether a file name asks for a number, as `out.%04d.exr` does; `%%` stands for a percent sign."""
     return _FIELD_LIKE.search(Path(pattern).name.replace("%%", "")) is not None

@@ -147,6 +147,57 @@ def plan(
 
 
 @app.command
+def compare(
+    scene: str,
+    /,
+    *,
+    methods: str | None = None,
+    device: str | None = None,
+    threads: PositiveInt | None = None,
+    time: Time = 0.0,
+    output: Annotated[Path | None, Parameter(name=["--output", "-o"])] = None,
+) -> None:
+    """Measure error against run time and memory: every method at several settings, beside a converged reference.
+
+    Parameters
+    ----------
+    scene
+        A bundled scene's name, or a TOML file.
+    methods
+        Names with commas between them; all that can be compared when left out.
+    device
+        `cpu`, `cuda:0`, ...; the best one present when left out.
+    threads
+        Threads on the CPU.
+    time
+        Seconds on the water's clock.
+    output
+        A folder for `compare.json` and `compare.png`, made if need be; only the table is shown when left out.
+    """
+    from warp_caustics.cli.compare_table import print_comparison
+    from warp_caustics.comparison.record import JSON_NAME, PICTURE_NAME
+    from warp_caustics.comparison.run import compare as compare_methods
+    from warp_caustics.comparison.settings import chosen_methods
+    from warp_caustics.files import check_folder
+    from warp_caustics.scene import load_scene
+
+    names = chosen_methods(None if methods is None else methods.split(","))
+    loaded = load_scene(scene)
+    if output is not None:
+        check_folder(output, JSON_NAME, PICTURE_NAME)
+    start_warp()
+    interrupt = Interrupt()
+    with interrupt.watch():
+        with report.steps() as tell:
+            comparison = compare_methods(loaded, names, device=device, threads=threads, time=time, tell=tell)
+        print_comparison(comparison)
+        if output is not None:
+            with interrupt.hold():
+                files = comparison.save(output)
+            report.print_files(files)
+
+
+@app.command
 def view(
     scene: str,
     /,

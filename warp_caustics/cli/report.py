@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import track
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, track
 from rich.table import Table
 
 from warp_caustics import __version__
@@ -50,6 +50,26 @@ def working(what: str) -> AbstractContextManager[object]:
     """Say what is being waited for while a block runs, where there is a terminal to show it."""
     terminal = Console(stderr=True)
     return terminal.status(what) if terminal.is_terminal else nullcontext()
+
+
+@contextmanager
+def steps() -> Iterator[Callable[[int, int, str], None]]:
+    """Give what is told of each step its number, how many there are and its name: a bar, where there is a terminal.
+
+    The bar is drawn at each step and at no other time: a thread that drew it meanwhile would disturb what is timed.
+    """
+    bar = Console(stderr=True)
+    if not bar.is_terminal:
+        yield lambda number, count, what: None
+        return
+    columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.description}"))
+    with Progress(*columns, console=bar, transient=True, auto_refresh=False) as progress_bar:
+        task = progress_bar.add_task("", total=None)
+
+        def tell(number: int, count: int, what: str) -> None:
+            progress_bar.update(task, completed=number, total=count, description=escape(what), refresh=True)
+
+        yield tell
 
 
 def print_files(paths: Sequence[Path]) -> None:

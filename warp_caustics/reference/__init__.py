@@ -19,13 +19,13 @@ from ..magnitude import check_magnitudes
 from ..scene import Scene, load_scene
 from ..water import check_time
 from . import cache as disk
-from .converge import Budget, Level, converge, relative_l2
+from .converge import Budget, Level, converge
 from .roads import Roads
 
 if TYPE_CHECKING:
     from ..facts import Facts
 
-__all__ = ["Reference", "jittered_photons", "make_reference", "relative_l2"]
+__all__ = ["Reference", "jittered_photons", "make_reference"]
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.reference.cells import PARTS
+from ..metrics import relative_l2
 from ..window import lattice_over
 from .roads import Sums
 
@@ -36,13 +37,6 @@ class Level:
     per_side: int
     directions: int
     error_bar: float
-
-
-def relative_l2(image: np.ndarray, reference: np.ndarray) -> float:
-    """Root mean square difference over the mean of the reference; 0 for two dark maps."""
-    difference = float(np.sqrt(np.mean((np.asarray(image, dtype=np.float64) - reference) ** 2)))
-    mean = float(np.mean(reference))
-    return difference / mean if mean > 0.0 else (0.0 if difference == 0.0 else np.inf)
 
 
 def converge(roads: Roads, facts: Facts, budget: Budget, land: np.ndarray) -> Level:

@@ -73,7 +73,7 @@ class ReferenceSettings(Model):
     """`[method.reference]`: the converged answer, in float64."""
 
     tolerance: Positive = Field(
-        default=2e-4, description="relative L2 difference of two levels at which they are taken as converged"
+        default=2.5e-4, description="relative L2 difference of two levels at which they are taken as converged"
     )
     rays: Count = Field(
         default=2**26, description="rays of a level at most; past them the error bar stays above the tolerance"

@@ -50,6 +50,17 @@ class Scene(Model):
         coloured = isinstance(self.sun.irradiance, tuple) or isinstance(self.medium.absorption, tuple)
         return 3 if coloured or self.medium.jerlov is not None else 1
 
+    def at_resolution(self, columns: int, rows: int) -> Scene:
+        """Return the scene with another number of pixels on the same map.
+
+        Raises
+        ------
+        InputError
+            If there can be no such map.
+        """
+        resized = Map(origin=self.map.origin, size=self.map.size, resolution=(columns, rows))
+        return self.model_copy(update={"map": resized})
+
     def to_toml(self) -> str:
         """Return the scene as the text of a scene file, with the keys that were given.
 
