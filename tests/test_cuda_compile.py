@@ -9,6 +9,10 @@ import warp as wp
 
 from warp_caustics.kernels.beam import make_cells, make_corners
 from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
+from warp_caustics.kernels.reference.cells import make_cells as make_reference_cells
+from warp_caustics.kernels.reference.cells import make_rays
+from warp_caustics.kernels.reference.land import make_land
+from warp_caustics.kernels.reference.photons import make_photons
 from warp_caustics.kernels.resolve import make_dry_land, make_resolve
 from warp_caustics.kernels.scatter import make_scatter
 from warp_caustics.kernels.spec import Spec
@@ -24,6 +28,7 @@ EVERYTHING = Spec(
     objects=True,
     bounded=True,
     shore=True,
+    hills_shade=True,
     occluders=True,
     self_shadow=True,
     faces_away=True,
@@ -47,6 +52,10 @@ KERNELS = {
     "columns": lambda: make_columns(3),
     "resolve": lambda: make_resolve("fixed", 3, 3),
     "dry_land": lambda: make_dry_land(EVERYTHING),
+    "reference_rays": lambda: make_rays(EVERYTHING),
+    "reference_cells": lambda: make_reference_cells(EVERYTHING),
+    "reference_photons": lambda: make_photons(BACKLUND, True),
+    "reference_land": lambda: make_land(EVERYTHING),
 }
 
 
