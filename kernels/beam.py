@@ -26,7 +26,7 @@ from .patch import (
     plane_mean,
     thickness,
 )
-from .photon import LANDED, LANDED_ON_OBJECT, Scene, SunSample, make_photon
+from .photon import LANDED, LANDED_ON_OBJECT, LOST, Scene, SunSample, make_photon
 from .spec import Spec
 from .wave_table import make_water_on_lattice
 
@@ -77,7 +77,7 @@ def make_corners(spec: Spec) -> wp.Kernel:
         offset = deviation(lattice, result.distance, result.direction, light.rest_shift)
         planes_out[0, row, column] = offset[0]
         planes_out[1, row, column] = offset[1]
-        planes_out[2, row, column] = result.incident
+        planes_out[2, row, column] = wp.where(result.state == LOST, wp.NAN, result.incident)
         if wp.static(fresnel):
             planes_out[3, row, column] = result.transmitted
         if wp.static(absorbs):
@@ -182,6 +182,11 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
         share = share_of_cell(lattice, low, high)
         incident = share * plane_mean(planes, 2, row, column, weights)
         transmitted = share * plane_mean(planes, wp.static(transmitted_plane), row, column, weights)
+        if common != 0 and not wp.isfinite(incident):
+            # A corner beside it is no number: the cell takes in what it would at rest, and none of it arrives.
+            common = int(LOST)
+            incident = -share * suns[sun].direction[2]
+            transmitted = incident
         if common == LANDED or common == LANDED_ON_OBJECT:
             mean = flux_type()
             for c in range(wp.static(channels)):

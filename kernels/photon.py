@@ -87,13 +87,14 @@ def make_attenuate(spec: Spec) -> wp.Function:
 
     @wp.func
     def attenuate(medium: Medium, distance: float, direction: wp.vec3) -> wp.vec3:
-        if wp.static(not absorbs):
+        if wp.static(absorbs):
+            way = distance
+            if wp.static(by_depth):
+                way = -distance * direction[2]
+            c = medium.attenuation
+            return wp.vec3(wp.exp(-c[0] * way), wp.exp(-c[1] * way), wp.exp(-c[2] * way))
+        else:  # what follows a static return would stay in the code
             return wp.vec3(1.0, 1.0, 1.0)
-        way = distance
-        if wp.static(by_depth):
-            way = -distance * direction[2]
-        c = medium.attenuation
-        return wp.vec3(wp.exp(-c[0] * way), wp.exp(-c[1] * way), wp.exp(-c[2] * way))
 
     return attenuate
 
@@ -148,10 +149,11 @@ def make_wet(spec: Spec) -> wp.Function:
 
     @wp.func
     def wet(receiver: Receiver, origin: wp.vec3, slope: wp.vec2, size: wp.vec2) -> float:
-        if wp.static(not shore):
+        if wp.static(shore):
+            ground = terrain_at(receiver.terrain, origin[0], origin[1])
+            return share_lit(origin[2] - ground[0], wp.vec2(slope[0] - ground[1], slope[1] - ground[2]), size)
+        else:
             return 1.0
-        ground = terrain_at(receiver.terrain, origin[0], origin[1])
-        return share_lit(origin[2] - ground[0], wp.vec2(slope[0] - ground[1], slope[1] - ground[2]), size)
 
     return wet
 
@@ -198,7 +200,10 @@ def make_land(spec: Spec) -> wp.Function:
                 photon.state = LEFT
         photon.arrived = photon.transmitted * attenuate(scene.medium, photon.distance, photon.direction)
         if not wp.isfinite(photon.distance + wp.length_sq(photon.direction) + incident):
+            # What it took in is not known; it is counted as what it would take in at rest.
             photon.state = LOST
+            photon.incident = -sun[2]
+            photon.transmitted = -sun[2]
         return photon
 
     return land
@@ -222,6 +227,8 @@ def make_photon(spec: Spec) -> wp.Function:
         point = wp.vec2(0.0, 0.0)
         incident = facing(sun, slope)
         result = land(scene, sun, origin, slope, incident)
+        if result.state == LOST:
+            return result
         if wp.static(shades):
             if lit(scene, sun, origin, slope, point) < 0.5:
                 result.state = BLOCKED

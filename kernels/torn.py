@@ -15,7 +15,7 @@ from .deposit import ACCUMULATOR, FLUX
 from .lattice import Lattice, at_rest, clip_to_water, on_water, pixel_base, pixel_fraction, share_of_cell
 from .ledger import EMITTED, OVER_LIT, SHADED, make_book_landed, make_count_unlanded, tally
 from .optics import facing, refract_at_slope
-from .photon import LANDED, LANDED_ON_OBJECT, Photon, Scene, SunSample, make_land, make_lit, make_wet
+from .photon import LANDED, LANDED_ON_OBJECT, LOST, Photon, Scene, SunSample, make_land, make_lit, make_wet
 from .spec import Spec
 from .surface import HEIGHT_SLOPE_AND_CURVATURE
 from .waves import vec6
@@ -70,6 +70,9 @@ def make_torn(spec: Spec) -> wp.Kernel:
         origin = wp.vec3(water[0], water[1], z[0])
         slope = wp.vec2(z[1], z[2])
         share = share_of_cell(lattice, low, high)
+        if not wp.isfinite(z[0] + z[1] + z[2]):
+            count_unlanded(ledger, bin, LOST, -share * sun.direction[2], -share * sun.direction[2])
+            return
         share *= wet(scene.receiver, origin, slope, size)
         incident = facing(sun.direction, slope)
         if incident <= 0.0:

@@ -91,6 +91,10 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     spec = specify(scene, assets, Light(suns, slopes, steepest, amplitude), wide)
     if spec.occluders:
         warnings.append("receiver: a mesh rises above the water; it shades the water, and its dry part is not lit")
+    if spec.receiver == "plane" and wide.lowest > -amplitude:
+        warnings.append(
+            "receiver.plane: troughs may reach below it, and are lit as water; a terrain would be dry there"
+        )
     return Facts(
         scene=scene,
         assets=assets,

@@ -11,7 +11,7 @@ from .errors import InputError
 from .facts import Facts, gather_facts
 from .kernels.deposit import ACCUMULATOR
 from .kernels.ledger import BINS, ENTRIES
-from .magnitude import check_magnitudes
+from .magnitude import check_asset_magnitudes, check_magnitudes
 from .methods import METHODS
 from .program import Buffer, Program
 from .scene import Scene, known_method, load_scene
@@ -165,7 +165,9 @@ def make_plan(
     device = resolve_device(device)
     check_magnitudes(scene)
     check_map_fits(scene, device, free_memory(device))
-    facts = gather_facts(scene, load_assets(scene))
+    assets = load_assets(scene)
+    check_asset_magnitudes(assets)
+    facts = gather_facts(scene, assets)
     if name == "reference":
         from .reference.plan import ReferencePlan
 

@@ -15,11 +15,26 @@ from .kernels.wave_table import wave_table
 
 if TYPE_CHECKING:
     from .kernels.spec import Spec
+    from .scene import Scene
     from .window import Lattice
 
 
 MOST_JOBS = 4096
 """Strips times directions of the sun at most: each is recorded, at 4 KB and a tenth of a millisecond a launch."""
+
+
+CROWD = 2**12
+"""Cells for each pixel past which a map is summed in float64 unless the scene says otherwise: float32 rounds as many
+sums to 1e-5 of a pixel, and at 2^24 of them adds nothing more."""
+
+
+def accumulator(scene: Scene, lattice: Lattice) -> str:
+    """Choose the number format that a map is summed in: the scene's own, or what its cells need if it names none."""
+    columns, rows = scene.map.resolution
+    crowded = lattice.cells > CROWD * columns * rows
+    if crowded and "accumulate" not in scene.method.model_fields_set:
+        return "float64"
+    return scene.method.accumulate
 
 
 def strip_rows(least: int, lattice: Lattice, suns: int) -> int:

@@ -27,6 +27,9 @@ UNITS = "unit of sun.irradiance"
 OVER_LIT_LIMIT = 0.01
 """Share of the light that may enter twice before it is worth a warning."""
 
+LOST_LIMIT = 1e-5
+"""Share of the light that the sums of a map may lose before it is worth a warning: what is promised on planes."""
+
 
 @dataclass(frozen=True)
 class Result:
@@ -99,6 +102,14 @@ class Result:
             notes.append(
                 f"water.self_shadow is false, and {over_lit / emitted:.1%} of the light enters twice, "
                 "through crests and again behind them"
+            )
+        dropped = np.max(self.energy.dropped)
+        if dropped > 0.0:
+            notes.append(f"{dropped / emitted:.1e} of the light had no finite path and was dropped")
+        if self.energy.unaccounted > LOST_LIMIT:
+            notes.append(
+                f"method.accumulate: the map's sums are off by {self.energy.unaccounted:.1e} of the light; "
+                '"float64" keeps it'
             )
         return notes
 

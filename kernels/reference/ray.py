@@ -155,6 +155,11 @@ def make_trace(spec: Spec) -> wp.Function:
         ray = Ray()
         z = water_at(world.water, x, y)
         origin = wp.vec3d(x, y, z[0])
+        if not wp.isfinite(z[0] + z[1] + z[2]):
+            # Water that is no number takes in what it would at rest, and loses it.
+            ray.incident = -sun[2]
+            ray.fate = DROPPED
+            return ray
         ray.incident = z[1] * sun[0] + z[2] * sun[1] - sun[2]
         if wp.static(shore):
             if land_gap(world.terrain, origin, sun, zero, wp.float64(1.0)) < zero:

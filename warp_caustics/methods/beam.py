@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from ..kernels.beam import make_cells, make_corners
 from ..kernels.patch import BORDER, flux_planes
 from ..kernels.torn import make_torn
-from ..program import Buffer, Pass, Program, strip_rows, wave_pass
+from ..program import Buffer, Pass, Program, accumulator, strip_rows, wave_pass
 from ..window import lattice_over
 
 if TYPE_CHECKING:
@@ -21,9 +22,10 @@ STRIP_ROWS = 64
 
 def beam(facts: Facts) -> Program:
     """Plan the corners, the cells and, where they can be torn, the torn cells."""
-    settings, spec = facts.scene.method.beam, facts.spec
+    settings = facts.scene.method.beam
     low, high = facts.deviation
     lattice = lattice_over(low, high, facts.scene.map.resolution, float(np.sqrt(1.0 / settings.samples_per_pixel)))
+    spec = replace(facts.spec, accumulate=accumulator(facts.scene, lattice))
     columns, rows = lattice.count[0], strip_rows(STRIP_ROWS, lattice, len(facts.suns))
     beside = 1 + 2 * BORDER
     corners = (rows + beside, columns + beside)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.scatter import make_scatter
-from ..program import Pass, Program, strip_rows, wave_pass
+from ..program import Pass, Program, accumulator, strip_rows, wave_pass
 from ..window import lattice_over
 
 if TYPE_CHECKING:
@@ -29,6 +29,7 @@ def photon(facts: Facts) -> Program:
     # A box reaches half its width beyond the cell that the bounds speak of.
     spare = max(0.0, 0.5 * (width - step))
     lattice = lattice_over(low - spare, high + spare, facts.scene.map.resolution, step)
+    spec = replace(spec, accumulate=accumulator(facts.scene, lattice))
     columns, rows = lattice.count[0], strip_rows(STRIP_ROWS, lattice, len(facts.suns))
     waves = wave_pass(spec, lattice, facts.waves, rows, 0, 0.5)
     scatter = Pass(

@@ -15,7 +15,7 @@ from ..energy import Energy
 from ..errors import InputError
 from ..facts import gather_facts
 from ..ledger import beyond_border
-from ..magnitude import check_magnitudes
+from ..magnitude import check_asset_magnitudes, check_magnitudes
 from ..scene import Scene, load_scene
 from ..water import check_time
 from . import cache as disk
@@ -163,7 +163,9 @@ def _prepared(
     check_time(time)
     device = resolve_device(device)
     check_magnitudes(scene)
-    return gather_facts(scene, load_assets(scene)), device, resolve_threads(threads, device)
+    assets = load_assets(scene)
+    check_asset_magnitudes(assets)
+    return gather_facts(scene, assets), device, resolve_threads(threads, device)
 
 
 def _reference(facts: Facts, level: Level, land: np.ndarray, seconds: float) -> Reference:

@@ -87,7 +87,9 @@ class Method(Model):
 
     name: Annotated[str, METHOD_NAME] = Field(default="beam", description="the default of this scene")
     accumulate: Annotated[Literal["float32", "float64", "fixed"], one_of("float32", "float64", "fixed")] = Field(
-        default="float32", description="what flux is summed in; fixed point is the same on every run"
+        default="float32",
+        description="what flux is summed in; fixed point is the same on every run. When it is not given, maps with "
+        "more than 4096 cells for each pixel are summed in float64",
     )
     beam: BeamSettings = Field(default=BeamSettings(), description="parameters of beam")
     photon: PhotonSettings = Field(default=PhotonSettings(), description="parameters of photon")
