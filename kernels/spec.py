@@ -10,13 +10,13 @@ class Spec:
     Attributes
     ----------
     water : str
-        ``"waves"`` (a sum of sines) or ``"grid"`` (a height map).
+        ``"waves"`` (a sum of sines), ``"grid"`` (a height map) or ``"periodic"`` (one that repeats without end).
     receiver : str
         ``"plane"``, ``"waves"`` (terrain in closed form), ``"grid"`` (terrain from a file) or ``"mesh"``.
     objects : bool
         Meshes stand on the receiver: a second intersection by BVH.
     bounded : bool
-        The water ends at the border of its height map: cells are clipped to it.
+        The water ends at a border, of its height map or its basin: cells are clipped to it.
     shore : bool
         The receiver may rise above the water: wet and dry, and land that shades water.
     hills_shade : bool

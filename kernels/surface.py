@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .grid import Grid, grid_sum, grid_sum_curved
+from .grid import Grid, grid_place, grid_sum, grid_sum_curved, periodic_place
 from .waves import Wave, vec6, wave_sum, wave_sum_curved
 
 
@@ -36,17 +36,29 @@ def waves_curved_at(surface: Surface, x: float, y: float) -> vec6:
 @wp.func
 def grid_at(surface: Surface, x: float, y: float) -> wp.vec3:
     """Height and slope (z, z_x, z_y) of a height map."""
-    return grid_sum(surface.grid, x, y)
+    return grid_sum(surface.grid, grid_place(surface.grid, x, y))
 
 
 @wp.func
 def grid_curved_at(surface: Surface, x: float, y: float) -> vec6:
     """As :func:`grid_at`, with the second derivatives."""
-    return grid_sum_curved(surface.grid, x, y)
+    return grid_sum_curved(surface.grid, grid_place(surface.grid, x, y))
 
 
-HEIGHT_AND_SLOPE = {"waves": waves_at, "grid": grid_at}
+@wp.func
+def periodic_at(surface: Surface, x: float, y: float) -> wp.vec3:
+    """Height and slope (z, z_x, z_y) of a height map that repeats."""
+    return grid_sum(surface.grid, periodic_place(surface.grid, x, y))
+
+
+@wp.func
+def periodic_curved_at(surface: Surface, x: float, y: float) -> vec6:
+    """As :func:`periodic_at`, with the second derivatives."""
+    return grid_sum_curved(surface.grid, periodic_place(surface.grid, x, y))
+
+
+HEIGHT_AND_SLOPE = {"waves": waves_at, "grid": grid_at, "periodic": periodic_at}
 """By kind of surface: (z, z_x, z_y) at a point."""
 
-HEIGHT_SLOPE_AND_CURVATURE = {"waves": waves_curved_at, "grid": grid_curved_at}
+HEIGHT_SLOPE_AND_CURVATURE = {"waves": waves_curved_at, "grid": grid_curved_at, "periodic": periodic_curved_at}
 """By kind of surface: (z, z_x, z_y, z_xx, z_xy, z_yy) at a point."""

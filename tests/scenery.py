@@ -43,12 +43,14 @@ def scene(
     origin: tuple[float, float] = (0.0, 0.0),
     level: float = 1.0,
     height_map: dict[str, Any] | None = None,
+    simulation: dict[str, Any] | None = None,
     self_shadow: str | bool = "auto",
     sun: dict[str, Any] | None = None,
     method: dict[str, Any] | None = None,
 ) -> wc.Scene:
     """Make a scene of one metre of water over a flat floor at z = 0, with pixels that are not square."""
-    water = {"waves": list(waves)} if height_map is None else {"height_map": height_map}
+    kinds: dict[str, Any] = {"height_map": height_map, "simulation": simulation}
+    water = {name: given for name, given in kinds.items() if given is not None} or {"waves": list(waves)}
     return wc.Scene(
         water={"level": level, "self_shadow": self_shadow, **water},
         receiver={"plane": 0.0} if receiver is None else receiver,

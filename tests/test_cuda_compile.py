@@ -8,7 +8,17 @@ import pytest
 import warp as wp
 
 from warp_caustics.kernels.beam import make_cells, make_corners
+from warp_caustics.kernels.fft import make_fft_rows
 from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
+from warp_caustics.kernels.height_field import (
+    begin_solve,
+    make_drop,
+    make_leap,
+    make_pressure,
+    make_solve,
+    make_surface,
+)
+from warp_caustics.kernels.nodes import make_extremes, make_nodes
 from warp_caustics.kernels.reference.cells import make_cells as make_reference_cells
 from warp_caustics.kernels.reference.cells import make_rays
 from warp_caustics.kernels.reference.land import make_land
@@ -16,6 +26,7 @@ from warp_caustics.kernels.reference.photons import make_photons
 from warp_caustics.kernels.resolve import make_dry_land, make_resolve
 from warp_caustics.kernels.scatter import make_scatter
 from warp_caustics.kernels.spec import Spec
+from warp_caustics.kernels.spectral import make_evolve, make_turn, spectral_surface
 from warp_caustics.kernels.torn import make_torn
 from warp_caustics.kernels.wave_table import wave_table
 
@@ -39,7 +50,9 @@ EVERYTHING = Spec(
     channels=3,
     accumulate="fixed",
 )
-BACKLUND = Spec(receiver="mesh", tears=True, backlund=True, attenuation="depth", channels=3, accumulate="float64")
+BACKLUND = Spec(
+    water="periodic", receiver="mesh", tears=True, backlund=True, attenuation="depth", channels=3, accumulate="float64"
+)
 
 KERNELS = {
     "wave_table": lambda: wave_table,
@@ -51,6 +64,18 @@ KERNELS = {
     "rows": lambda: make_rows(1),
     "columns": lambda: make_columns(3),
     "resolve": lambda: make_resolve("fixed", 3, 3),
+    "fft_rows": lambda: make_fft_rows(1024, True),
+    "evolve": lambda: make_evolve(True),
+    "turn": lambda: make_turn(True),
+    "spectral_surface": lambda: spectral_surface,
+    "pressure": lambda: make_pressure(True, True, True),
+    "leap": lambda: make_leap(True, True),
+    "begin_solve": lambda: begin_solve,
+    "solve": lambda: make_solve(True, True),
+    "drop": lambda: make_drop(True),
+    "surface": lambda: make_surface(True, True),
+    "nodes": lambda: make_nodes(True),
+    "extremes": lambda: make_extremes(True),
     "dry_land": lambda: make_dry_land(EVERYTHING),
     "reference_rays": lambda: make_rays(EVERYTHING),
     "reference_cells": lambda: make_reference_cells(EVERYTHING),

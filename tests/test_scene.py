@@ -141,7 +141,7 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
 @pytest.mark.parametrize(
     ("tables", "fault"),
     [
-        ({"water": {"level": 1.0}}, "water: expected exactly one of waves or height_map, got none"),
+        ({"water": {"level": 1.0}}, "water: expected exactly one of waves, height_map or simulation, got none"),
         ({"water": 3}, "water: expected a table, got 3"),
         ({"water": {"level": 1.0, "waves": 3}}, "water.waves: expected a list of tables, got 3"),
         ({"water": {"level": 1.0, "waves": [3]}}, "water.waves[0]: expected a table, got 3"),
@@ -156,10 +156,6 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
         (
             {"water": {"level": 1.0, "preset": "ripples"}},
             "water.preset: not yet in this version, use waves or height_map",
-        ),
-        (
-            {"water": {"level": 1.0, "simulation": {}}},
-            "water.simulation: not yet in this version, use waves or height_map",
         ),
         (
             {"water": {"level": 10**5000, "waves": []}},

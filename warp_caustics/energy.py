@@ -32,8 +32,8 @@ class Energy(Mapping[str, "float | np.ndarray"]):
     blocked
         Falls in the shadow of a crest, of land or of an object.
     missed_by_window
-        Lands in the map, but from water outside a gather's window; or would have come, were it at rest, from water
-        beyond the border of a height map.
+        Lands in the map, but from water outside a gather's window; or would have come, were it at rest, from beyond
+        the border of the water, of a height map or a basin.
     dropped
         Had no finite path.
     dry

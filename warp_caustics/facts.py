@@ -9,6 +9,7 @@ import numpy as np
 
 from .kernels.spec import Spec
 from .receiver import SHALLOWEST, Bounds, check_covered, receiver_bounds, receiver_kind, rest_depth
+from .simulation.basin import Basin, make_basin
 from .specify import Light, Reason, reasons, specify
 from .sun import MOST_DIRECTIONS, disk_count, disk_directions
 from .water import amplitude_bound, extreme_slopes
@@ -43,12 +44,22 @@ class Facts:
     backlund_deviation: tuple[np.ndarray, np.ndarray]
     longest_way: float
     reasons: tuple[Reason, ...]
+    basin: Basin | None = None
     warnings: tuple[str, ...] = field(default=())
 
     @property
     def sun_share(self) -> float:
         """Irradiance of one direction of the sun, where the whole disk gives 1 on a plane that faces its middle."""
         return float(1.0 / (self.suns @ self.scene.sun.unit_direction).sum())
+
+    @property
+    def water_border(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Lower and upper corner of water that ends, from the map's origin [m]; None for water without a border."""
+        water = self.assets.water if self.basin is None else None if self.basin.periodic else self.basin
+        if water is None:
+            return None
+        low = np.subtract(water.origin, self.scene.map.origin)
+        return low, low + np.asarray(water.size)
 
     @property
     def waves(self) -> int:
@@ -62,7 +73,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     Raises
     ------
     InputError
-        If the map reaches past the terrain.
+        If the map reaches past the terrain, or the water's simulation cannot be had.
     """
     check_covered(scene, assets)
     ior, warnings = scene.medium.green_ior, []
@@ -88,6 +99,12 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     # Eq. 3.3 meets the ground along the unrefracted ray, so wherever that is.
     anywhere = (0.0, max(0.0, -wide.lowest) + amplitude)
     by_backlund = _deviation([((r.backlund_low, r.backlund_high), r.rest) for r in reaches], anywhere, reference, pixel)
+    shifts = np.array([reference * reach.rest for reach in reaches])
+    basin = None
+    if scene.water.simulation is not None:
+        low, high = np.asarray(scene.map.origin) - shifts.max(axis=0), np.asarray(scene.map.origin) - shifts.min(axis=0)
+        low, high = low - deviation[1] * pixel, high + scene.map.size - deviation[0] * pixel
+        basin = make_basin(scene, depth, low, high)
     spec = specify(scene, assets, Light(suns, slopes, steepest, amplitude), wide)
     if spec.occluders:
         warnings.append("receiver: a mesh rises above the water; it shades the water, and its dry part is not lit")
@@ -103,7 +120,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         attenuation=_attenuation(scene),
         irradiance=_colour(scene.sun.irradiance, scene.channels),
         suns=suns,
-        rest_shifts=np.array([reference * reach.rest for reach in reaches]),
+        rest_shifts=shifts,
         rest_depth=depth,
         amplitude=amplitude,
         slope=float(np.linalg.norm(slopes, axis=1).max()),
@@ -113,6 +130,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         backlund_deviation=by_backlund,
         longest_way=float(max(amplitude - wide.lowest, SHALLOWEST) * np.hypot(1.0, steepest)),
         reasons=reasons(scene, spec, len(suns)),
+        basin=basin,
         warnings=tuple(warnings),
     )
 

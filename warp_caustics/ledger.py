@@ -52,12 +52,10 @@ def read_energy(plan: Plan, ledgers: np.ndarray, caustic_map: np.ndarray, dry: n
 
 
 def beyond_border(facts: Facts) -> float:
-    """Light at unit irradiance that would light the map, were it at rest, from beyond a height map's border [W]."""
-    grid = facts.assets.water
-    if grid is None:
+    """Light at unit irradiance that would light the map, were it at rest, from beyond the water's border [W]."""
+    if facts.water_border is None:
         return 0.0
-    low = np.subtract(grid.origin, facts.scene.map.origin)
-    high = low + np.asarray(grid.size)
+    low, high = facts.water_border
     total = 0.0
     for sun, shift in zip(facts.suns, facts.rest_shifts, strict=True):
         inside = np.minimum(high + shift, facts.scene.map.size) - np.maximum(low + shift, 0.0)

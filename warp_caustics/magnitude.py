@@ -16,7 +16,9 @@ if TYPE_CHECKING:
 LARGEST, SMALLEST = 1e18, 1e-18
 """Sizes whose squares float32 still holds."""
 
-DIVISORS = frozenset({"size", "samples_per_pixel", "photons_per_pixel", "footprint"})
+DIVISORS = frozenset(
+    {"size", "cell", "step", "density", "radius", "samples_per_pixel", "photons_per_pixel", "footprint"}
+)
 """Keys by whose values something is divided: they must not be too small either."""
 
 LIGHT = frozenset({"irradiance"})

@@ -15,6 +15,7 @@ from .magnitude import check_asset_magnitudes, check_magnitudes
 from .methods import METHODS
 from .program import Buffer, Program
 from .scene import Scene, known_method, load_scene
+from .simulation import SimulationPass, frame_launches, simulation_buffers, simulation_passes, step_launches
 from .window import TOO_FAR
 
 if TYPE_CHECKING:
@@ -70,15 +71,22 @@ class Plan:
 
     @property
     def launches(self) -> int:
-        """Kernel launches in a frame."""
+        """Kernel launches in a frame, a simulation's steps and drops apart."""
         jobs = self.program.strips * len(self.facts.suns)
-        return jobs * len(self.program.passes) + 1 + int(self.facts.spec.shore)
+        water = 0 if self.facts.basin is None else frame_launches(self.facts.basin)
+        return water + jobs * len(self.program.passes) + 1 + int(self.facts.spec.shore)
+
+    @property
+    def water_passes(self) -> tuple[SimulationPass, ...]:
+        """What a simulation of the water launches before all else."""
+        return () if self.facts.basin is None else simulation_passes(self.facts.basin)
 
     @property
     def kernels(self) -> tuple[str, ...]:
         """Names of the kernels that are compiled."""
         dry = ("dry_land",) if self.facts.spec.shore else ()
-        return (*(step.name for step in self.program.passes), "resolve", *dry)
+        water = (step.name for step in self.water_passes)
+        return (*water, *(step.name for step in self.program.passes), "resolve", *dry)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -104,6 +112,9 @@ class Plan:
             f"water {lattice.count[0]} x {lattice.count[1]} cells, {len(self.facts.suns)} sun direction(s)"
         )
         yield "passes"
+        for one in self.water_passes:
+            often = "launch(es)" if one.each == "frame" else f"a {one.each}"
+            yield f"  {one.name:<16}{one.launches:>6} {often:<12}{one.does}"
         jobs = program.strips * len(self.facts.suns)
         for step in program.passes:
             yield f"  {step.name:<16}{jobs:>6} launch(es)  {step.does}"
@@ -121,7 +132,9 @@ class Plan:
             times = f" x {copies} threads" if copies > 1 else ""
             shape = " x ".join(str(length) for length in buffer.shape)
             yield f"  {buffer.name:<16}{copies * buffer.bytes:>14,} bytes  {buffer.dtype} {shape}{times}"
-        yield f"{self.launches} launches, {len(self.kernels)} kernels, {self.bytes:,} bytes"
+        steps = 0 if self.facts.basin is None else step_launches(self.facts.basin)
+        more = f" and {steps} for each step of the water" if steps else ""
+        yield f"{self.launches} launches{more}, {len(self.kernels)} kernels, {self.bytes:,} bytes"
         for warning in self.warnings:
             yield f"warning: {warning}"
 
@@ -246,6 +259,8 @@ def _buffers(facts: Facts, program: Program) -> tuple[Buffer, ...]:
     for name, grid in (("water_nodes", facts.assets.water), ("terrain_nodes", facts.assets.terrain)):
         if grid is not None:
             buffers.append(Buffer(name, "vec4", grid.z.shape, 16))
+    if facts.basin is not None:
+        buffers += simulation_buffers(facts.basin)
     for name, mesh in (("mesh", facts.assets.mesh), ("objects", facts.assets.objects)):
         if mesh is not None:
             # Vertices and indices; the BVH is Warp's own and comes on top.

@@ -107,7 +107,8 @@ class Renderer:
         Raises
         ------
         InputError
-            If the time is not finite, or so late that the waves' phases are not known.
+            If the time is not finite, so late that the waves' phases are not known, or one that the water's
+            simulation does not reach.
         """
         check_time(time)
         start = perf_counter()
@@ -142,6 +143,7 @@ class Renderer:
             energy=energy,
             seconds=self._seconds + waited,
             assets=facts.assets,
+            notes=() if self._state.simulated is None else tuple(self._state.simulated.warnings()),
         )
 
     def _allocate(self) -> None:

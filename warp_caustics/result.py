@@ -56,6 +56,8 @@ class Result:
         A deferred frame: not yet.
     error_bar : float or None
         Relative L2 error that a reference's map may have (RMSE over mean); None for the other methods.
+    notes : tuple of str
+        What of this frame alone is to be known.
     """
 
     scene: Scene
@@ -69,6 +71,7 @@ class Result:
     assets: Assets = field(repr=False)
     picture: np.ndarray | None = None
     error_bar: float | None = None
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def surface_irradiance(self) -> np.ndarray | None:
@@ -96,7 +99,7 @@ class Result:
     @property
     def warnings(self) -> list[str]:
         """What to know before trusting the map."""
-        notes = list(self.plan.warnings)
+        notes = [*self.plan.warnings, *self.notes]
         emitted, over_lit = np.max(self.energy.emitted), np.max(self.energy.over_lit)
         if over_lit > OVER_LIT_LIMIT * emitted:
             notes.append(

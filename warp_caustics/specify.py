@@ -52,6 +52,13 @@ class Light:
     amplitude: float
 
 
+def water_kind(scene: Scene, assets: Assets) -> str:
+    """``"waves"``, ``"grid"`` (a height map, from a file or a simulation) or ``"periodic"`` (one that repeats)."""
+    if scene.water.simulation is not None:
+        return "periodic" if scene.water.simulation.border == "periodic" else "grid"
+    return "waves" if assets.water is None else "grid"
+
+
 def specify(scene: Scene, assets: Assets, light: Light, ground: Bounds) -> Spec:
     """Decide what the kernels contain; ``ground`` bounds the receiver, from the water's level."""
     kind, medium = receiver_kind(scene), scene.medium
@@ -65,10 +72,10 @@ def specify(scene: Scene, assets: Assets, light: Light, ground: Bounds) -> Spec:
     by_depth = medium.jerlov is not None
     absorbs = by_depth or bool(np.any(medium.absorption))
     return Spec(
-        water="waves" if assets.water is None else "grid",
+        water=water_kind(scene, assets),
         receiver=kind,
         objects=assets.objects is not None,
-        bounded=assets.water is not None,
+        bounded=water_kind(scene, assets) == "grid",
         shore=shore,
         hills_shade=shore and bool((ground.slope * across > -light.suns[:, 2]).any()),
         occluders=bool(top > -light.amplitude),
@@ -87,8 +94,13 @@ def reasons(scene: Scene, spec: Spec, suns: int) -> tuple[Reason, ...]:
     """Say of each thing that a scene could need whether it does, and why."""
     height_field, meshes = spec.receiver in HEIGHT_FIELDS, spec.objects or spec.receiver == "mesh"
     unshaded = "water.self_shadow is false" if spec.faces_away else "no slope reaches the sun's elevation"
+    simulation = scene.water.simulation
+    water = f"water is {'simulated' if simulation else 'a file' if spec.water == 'grid' else 'a sum of waves'}"
+    simulated = f"{simulation.kind}, {simulation.border}" if simulation else ""
     table = (
-        ("surface by height map", spec.bounded, "water is a file", "water is a sum of waves"),
+        ("surface by height map", spec.water != "waves", water, water),
+        ("simulation", simulation is not None, simulated, water),
+        ("border of the water", spec.bounded, "cells are clipped to it", "the water has no end"),
         ("Fresnel", spec.fresnel, "medium.fresnel", "medium.fresnel is false"),
         ("attenuation", spec.attenuation != "none", f"by {spec.attenuation}", "nothing absorbs: no path length"),
         ("transport by colour", spec.channels > 1, "absorption differs by channel", "all channels travel alike"),

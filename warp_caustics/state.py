@@ -7,18 +7,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from .height_map import hermite_nodes, node_spacing
+from .height_map import hermite_nodes
 from .kernels.grid import Grid
 from .kernels.lattice import Lattice
 from .kernels.photon import Scene, SunSample
 from .kernels.surface import Surface
 from .kernels.waves import Wave
 from .receiver import closed_terrain
+from .simulation import SimulatedWater
 from .water import phases
 
 if TYPE_CHECKING:
     from .assets import HeightGrid, TriangleMesh
     from .facts import Facts
+    from .simulation import Basin
     from .window import Lattice as HostLattice
 
 PIXELS_A_STEP = 0.25
@@ -40,6 +42,8 @@ class SceneState:
         What a photon meets.
     suns : wp.array
         Directions of the sun, written by :meth:`write`.
+    simulated : SimulatedWater or None
+        Water that is simulated.
     """
 
     def __init__(self, facts: Facts, device: str) -> None:
@@ -52,11 +56,14 @@ class SceneState:
         self._host_suns = wp.zeros(len(facts.suns), dtype=SunSample, device="cpu", pinned=pinned)
         self._waves = wp.empty(count, dtype=Wave, device=device)
         self.suns = wp.empty(len(facts.suns), dtype=SunSample, device=device)
+        self.simulated = None if facts.basin is None else SimulatedWater(facts.basin, device)
         self.scene = self._make_scene()
         self._write_constants()
 
     def write(self, time: float) -> None:
-        """Put the waves' phases at a time, and the sun, on the device; allocates nothing."""
+        """Put the waves' phases at a time, or simulated water, and the sun, on the device; allocates nothing."""
+        if self.simulated is not None:
+            self.simulated.advance(time)
         if len(self._host_waves):
             self._host_waves.numpy()["phase"] = phases(self._facts.scene, time, self._facts.rest_depth)
             wp.copy(self._waves, self._host_waves)
@@ -71,9 +78,8 @@ class SceneState:
         made.pixel = wp.vec2(*facts.pixel)
         made.map = wp.vec2i(*facts.scene.map.resolution)
         low, high = np.full(2, -ENDLESS), np.full(2, ENDLESS)
-        if facts.assets.water is not None:
-            low = np.subtract(facts.assets.water.origin, facts.scene.map.origin)
-            high = low + np.asarray(facts.assets.water.size)
+        if facts.water_border is not None:
+            low, high = facts.water_border
         made.low, made.high = wp.vec2(*low), wp.vec2(*high)
         return made
 
@@ -89,6 +95,8 @@ class SceneState:
         facts, scene = self._facts, Scene()
         step = max(PIXELS_A_STEP * float(facts.pixel.min()), facts.longest_way / STEPS_A_WAY)
         scene.water.surface = self._surface(facts.assets.water, self._waves)
+        if self.simulated is not None:
+            scene.water.surface.grid = self._grid(self.simulated.nodes, self.simulated.basin)
         scene.water.amplitude = facts.amplitude
         scene.water.slope = facts.slope
         scene.water.step = step
@@ -134,13 +142,17 @@ class SceneState:
         if grid is not None:
             nodes = hermite_nodes(grid.z)
             nodes[..., 0] -= level
-            made, spacing = Grid(), node_spacing(grid)
-            made.nodes = wp.array(nodes.astype(np.float32), dtype=wp.vec4, device=self._device)
-            made.origin = wp.vec2(*(np.subtract(grid.origin, self._facts.scene.map.origin) + 0.5 * spacing))
-            made.per_metre = wp.vec2(*(1.0 / spacing))
-            self._keep.append(made.nodes)
-            surface.grid = made
+            surface.grid = self._grid(wp.array(nodes.astype(np.float32), dtype=wp.vec4, device=self._device), grid)
+            self._keep.append(surface.grid.nodes)
         return surface
+
+    def _grid(self, nodes: wp.array, placed: HeightGrid | Basin) -> Grid:
+        """The kernels' form of nodes at the middles of cells."""
+        made, cell = Grid(), np.asarray(placed.cell)
+        made.nodes = nodes
+        made.origin = wp.vec2(*(np.subtract(placed.origin, self._facts.scene.map.origin) + 0.5 * cell))
+        made.per_metre = wp.vec2(*(1.0 / cell))
+        return made
 
     def _mesh(self, mesh: TriangleMesh | None) -> Any:
         if mesh is None:

@@ -25,6 +25,10 @@ EDGE_POINTS = 8
 RADII = np.linspace(0.0, 1.0, 9)
 """Where, from no slope to the farthest, refraction is tried for its bounds."""
 
+BETWEEN_SAMPLES = 0.05
+"""Share by which a simulation's bound of slope is widened: slopes are measured at nodes and half-way between them, and
+a drop one cell wide is 4 % steeper in some other place."""
+
 LONGEST_TIME = 1e9
 """Latest time [s], 32 years, at which a phase of float64 is still right to 1e-6 rad."""
 
@@ -78,11 +82,11 @@ def extreme_slopes(scene: Scene, assets: Assets) -> np.ndarray:
     """Points ``[n, 2]`` whose convex hull holds every slope that the surface can have, zero among them.
 
     For waves the slopes fill a zonotope, the sum of the segments from -a k to a k; for a height map they are bounded
-    by a disk.
+    by a disk, and for a simulation declared so.
     """
-    if assets.water is not None:
+    if assets.water is not None or scene.water.simulation is not None:
         angle = np.linspace(0.0, 2.0 * np.pi, DISK_DIRECTIONS, endpoint=False)
-        steepest = surface_hull(assets.water).slope / np.cos(np.pi / DISK_DIRECTIONS)
+        steepest = _steepest(scene, assets) / np.cos(np.pi / DISK_DIRECTIONS)
         rim = steepest * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     else:
         steps = np.array([np.multiply(wave.amplitude, wave.wavevector) for wave in scene.water.waves or ()])
@@ -90,6 +94,14 @@ def extreme_slopes(scene: Scene, assets: Assets) -> np.ndarray:
     share = np.arange(EDGE_POINTS)[:, None, None] / EDGE_POINTS
     outline = ((1.0 - share) * rim + share * np.roll(rim, -1, axis=0)).reshape(-1, 2)
     return (RADII[:, None, None] * outline).reshape(-1, 2)
+
+
+def _steepest(scene: Scene, assets: Assets) -> float:
+    """Bound of the slope of a height map, or the one that a simulation declares."""
+    if scene.water.simulation is not None:
+        return scene.water.simulation.max_slope * (1.0 + BETWEEN_SAMPLES)
+    assert assets.water is not None
+    return surface_hull(assets.water).slope
 
 
 def zonotope(steps: np.ndarray) -> np.ndarray:
@@ -104,6 +116,8 @@ def zonotope(steps: np.ndarray) -> np.ndarray:
 
 def amplitude_bound(scene: Scene, assets: Assets) -> float:
     """Largest displacement from the rest level, either way [m]."""
+    if scene.water.simulation is not None:
+        return scene.water.simulation.height_bound
     if assets.water is not None:
         hull = surface_hull(assets.water)
         return max(abs(hull.lowest), abs(hull.highest))
@@ -134,6 +148,10 @@ def water_heights(
     x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
     if assets.water is not None:
         return scene.water.level + sample_heights(assets.water, x, y)
+    if scene.water.simulation is not None:
+        from .simulation import simulated_heights
+
+        return scene.water.level + simulated_heights(scene, assets, x, y, time)
     if depth is None:
         from .receiver import rest_depth
 

@@ -24,6 +24,8 @@ class HeightField:
     nodes: wp.array2d[wp.vec4d]  # (z, z_u, z_v, z_uv) by node spacing
     origin: wp.vec2d  # of node (0, 0) [m]
     spacing: wp.vec2d  # of the nodes [m]
+    low: wp.vec2d  # lower corner of what is repeated [m]
+    period: wp.vec2d  # its size [m]
     steepest: wp.float64  # bound of the slope
     steepest_near: wp.array2d[wp.float64]  # the same, by patch, of all patches within ``window`` of it
     window: wp.float64  # [m]
@@ -91,8 +93,16 @@ def patches_at(field: HeightField, x: wp.float64, y: wp.float64) -> wp.vec3d:
 
 
 @wp.func
+def periodic_at(field: HeightField, x: wp.float64, y: wp.float64) -> wp.vec3d:
+    """(z, z_x, z_y) of a height map that repeats."""
+    across = wp.floor((x - field.low[0]) / field.period[0])
+    up = wp.floor((y - field.low[1]) / field.period[1])
+    return patches_at(field, x - across * field.period[0], y - up * field.period[1])
+
+
+@wp.func
 def sines_steepness(field: HeightField, x: wp.float64, y: wp.float64) -> wp.vec2d:
-    """Bound of the slope, and how far around (x, y) it holds [m]: everywhere, for sines."""
+    """Bound of the slope, and how far around (x, y) it holds [m]: everywhere, for what has no end."""
     return wp.vec2d(field.steepest, wp.float64(wp.inf))
 
 
@@ -112,5 +122,5 @@ def make_steepness(kind: str) -> wp.Function:
 
 @functools.cache
 def make_field(kind: str) -> wp.Function:
-    """The function of a kind of height field: ``"waves"`` or ``"grid"``."""
-    return patches_at if kind == "grid" else sines_at
+    """The function of a kind of height field: ``"waves"``, ``"grid"`` or ``"periodic"``."""
+    return {"grid": patches_at, "periodic": periodic_at}.get(kind, sines_at)

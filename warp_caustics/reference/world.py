@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
-from ..height_map import hermite_nodes, node_spacing, patch_slopes
+from ..height_map import hermite_nodes, node_spacing, patch_slopes, surface_hull
 from ..kernels.reference.meet import Mesh
 from ..kernels.reference.ray import World
 from ..kernels.reference.surface import HeightField, Sine
 from ..receiver import closed_terrain
+from ..simulation import simulated_surface
 from ..water import phases
 
 if TYPE_CHECKING:
@@ -50,15 +51,14 @@ class DeviceWorld:
         world.ior = facts.ior
         world.attenuation = wp.vec3d(*facts.attenuation)
         world.pixel = wp.vec2d(*facts.pixel)
-        low, high = np.full(2, -ENDLESS), np.full(2, ENDLESS)
-        if facts.assets.water is not None:
-            low = np.subtract(facts.assets.water.origin, facts.scene.map.origin)
-            high = low + np.asarray(facts.assets.water.size)
+        low, high = facts.water_border or (np.full(2, -ENDLESS), np.full(2, ENDLESS))
         world.low, world.high = wp.vec2d(*low), wp.vec2d(*high)
         return world
 
     def _water(self, time: float) -> HeightField:
         facts = self._facts
+        if facts.basin is not None:
+            return self._simulated(time)
         if facts.assets.water is not None:
             field = self._patches(facts.assets.water, 0.0)
         else:
@@ -66,6 +66,17 @@ class DeviceWorld:
             turns = phases(facts.scene, time, facts.rest_depth)
             field = self._sines([(w.amplitude, w.wavevector, turn) for w, turn in zip(waves, turns, strict=True)])
         field.steepest, field.highest = facts.slope, facts.amplitude
+        field.step = self._step()
+        return field
+
+    def _simulated(self, time: float) -> HeightField:
+        """Water as it is simulated, which is taken as it comes: the light is judged, not the water."""
+        facts = self._facts
+        basin, grid = simulated_surface(facts.scene, facts.assets, time)
+        field, hull = self._patches(grid, 0.0), surface_hull(grid)
+        field.steepest, field.highest = hull.slope, max(abs(hull.lowest), abs(hull.highest))
+        field.low = wp.vec2d(*np.subtract(basin.origin, facts.scene.map.origin))
+        field.period = wp.vec2d(*basin.size)
         field.step = self._step()
         return field
 

@@ -15,6 +15,7 @@ from warp_caustics.scene.method import (
 )
 from warp_caustics.scene.receiver import ClosedTerrain, MeshObject, Receiver, TerrainFile, TerrainWave
 from warp_caustics.scene.scene import Scene
+from warp_caustics.scene.simulation import Drop, Obstacle, Simulation
 from warp_caustics.scene.water import HeightMap, Water, Wave
 
 __all__ = [
@@ -26,15 +27,18 @@ __all__ = [
     "BeamSettings",
     "Camera",
     "ClosedTerrain",
+    "Drop",
     "GatherSettings",
     "HeightMap",
     "Map",
     "Medium",
     "MeshObject",
     "Method",
+    "Obstacle",
     "PhotonSettings",
     "Receiver",
     "Scene",
+    "Simulation",
     "Sun",
     "TerrainFile",
     "TerrainWave",

@@ -10,6 +10,7 @@ from pydantic import AfterValidator, Field
 from warp_caustics.scene.faults import listed, refusal
 from warp_caustics.scene.formats import GEOREFERENCED_SUFFIXES, HEIGHT_SUFFIXES, KEYED_SUFFIXES, suffix
 from warp_caustics.scene.model import Model, exactly_one
+from warp_caustics.scene.simulation import Simulation
 from warp_caustics.scene.values import Extent, HeightPath, Number, Pair, Said, Text, one_of, truth
 
 
@@ -80,7 +81,6 @@ class Water(Model):
     not_yet: ClassVar[Mapping[str, str]] = {
         "preset": "use waves or height_map",
         "spectrum": "use waves or height_map",
-        "simulation": "use waves or height_map",
     }
 
     level: Number = Field(description="z of the surface at rest [m]")
@@ -88,6 +88,7 @@ class Water(Model):
         default=None, description="waves, which add up; an empty list is flat water"
     )
     height_map: HeightMap | None = Field(default=None, description="instead of `waves`: displacement from `level`")
+    simulation: Simulation | None = Field(default=None, description="instead of `waves`: water that drops fall into")
     self_shadow: Annotated[Literal["auto"] | bool, one_of("auto", other=truth, or_else=", true or false")] = Field(
         default="auto",
         description='crests shade troughs: "auto" is on when the bound of the slope passes the sun\'s elevation',
@@ -97,4 +98,4 @@ class Water(Model):
     def rules(cls, given: Mapping[str, Any]) -> Iterator[str]:
         """Yield the fault of several kinds of water, or none."""
         yield from super().rules(given)
-        yield from exactly_one(given, ("waves", "height_map"), cls.not_yet)
+        yield from exactly_one(given, ("waves", "height_map", "simulation"), cls.not_yet)

@@ -1,0 +1,94 @@
+"""What a simulation launches and allocates, for the plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..program import Buffer
+from .chebyshev import chebyshev_count
+from .spectral import padded_shape
+
+if TYPE_CHECKING:
+    from .basin import Basin
+
+
+@dataclass(frozen=True)
+class SimulationPass:
+    """Launches of one kernel, in every ``"frame"``, every ``"step"``, or for every ``"drop"``."""
+
+    name: str
+    does: str
+    each: str = "frame"
+    launches: int = 1
+
+
+def simulation_passes(basin: Basin) -> tuple[SimulationPass, ...]:
+    """Say what is launched, in order."""
+    closing = (
+        SimulationPass("nodes", "slopes of the simulated water at its cells"),
+        SimulationPass("extremes", "its steepest slope and largest height, read back when a result is"),
+    )
+    if basin.spectral:
+        return (
+            SimulationPass("evolve", "each mode of the water taken to the time of the frame"),
+            SimulationPass("fft_rows", "modes summed up along x, then along y", launches=2),
+            SimulationPass("turn", "rows turned into columns between the two"),
+            SimulationPass("spectral_surface", "height of the simulated water at its cells"),
+            *closing,
+        )
+    surface = SimulationPass("surface", "height of the simulated water at a whole step")
+    drops = (SimulationPass("drop", "falls into the water", "drop"),) if basin.settings.drops else ()
+    steps: tuple[SimulationPass, ...]
+    if basin.explicit:
+        steps = (
+            SimulationPass("pressure", "of the water on its cells", "step"),
+            SimulationPass("leap", f"an explicit step of {basin.step:.4g} s", "step"),
+        )
+    else:
+        count = implicit_iterations(basin)
+        steps = (
+            SimulationPass("begin_solve", f"an implicit step of {basin.step:.4g} s", "step"),
+            SimulationPass("pressure", "of the water on its cells, in each iteration", "step", count),
+            SimulationPass("solve", "Chebyshev iterations for the mean of its two heights", "step", count),
+            SimulationPass("end_solve", "the new state from the mean", "step"),
+        )
+    return (*drops, *steps, surface, *closing)
+
+
+def implicit_iterations(basin: Basin) -> int:
+    """Chebyshev iterations of an implicit step."""
+    drag = 0.5 * basin.settings.damping * basin.step
+    return chebyshev_count(0.25 * basin.step**2 / (1.0 + drag) * basin.stiffest)
+
+
+def frame_launches(basin: Basin) -> int:
+    """Launches of every frame, steps and drops apart."""
+    return sum(one.launches for one in simulation_passes(basin) if one.each == "frame")
+
+
+def step_launches(basin: Basin) -> int:
+    """Launches of every step."""
+    return sum(one.launches for one in simulation_passes(basin) if one.each == "step")
+
+
+def simulation_buffers(basin: Basin) -> tuple[Buffer, ...]:
+    """Say what is allocated."""
+    cells, drops = (basin.rows, basin.columns), len(basin.settings.drops)
+    buffers = [Buffer("water_nodes", "vec4", cells, 16), Buffer("water_surface", "float64", cells, 8),
+               Buffer("water_extremes", "float32", (2,), 4)]  # fmt: skip
+    if basin.spectral:
+        rows, columns = padded_shape(basin)
+        buffers += [
+            Buffer("spectrum", "vec2d", cells, 16),
+            Buffer("modes", "vec2d", (basin.rows, columns), 16),
+            Buffer("turned", "vec2d", (basin.columns, rows), 16),
+        ]
+        return tuple(buffers)
+    state = ("water_height", "water_velocity", "pressure", *(() if basin.explicit else ("mean", "change")))
+    buffers += [Buffer(name, "float64", cells, 8) for name in state]
+    if basin.solid is not None:
+        buffers.append(Buffer("solid", "uint8", cells, 1))
+    if drops:
+        buffers.append(Buffer("drop_profiles", "float64", (drops, basin.rows + basin.columns), 8))
+    return tuple(buffers)

@@ -1,0 +1,91 @@
+"""Spectral water on a device: its modes at rest, and the launches that take them to a time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from ..kernels.fft import fft_block, make_fft_rows
+from ..kernels.spectral import Dispersion, make_evolve, make_turn, spectral_surface
+from ..water import GRAVITY
+from .drops import drop_profiles
+
+if TYPE_CHECKING:
+    from .basin import Basin
+
+
+class SpectralWater:
+    """Modes of water that started at rest; nothing is kept from one time to the next.
+
+    Attributes
+    ----------
+    surface : wp.array
+        Displacement at the cells [m], float64 ``[rows, columns]``, written by :meth:`advance`.
+    """
+
+    def __init__(self, basin: Basin, device: str) -> None:
+        self._basin = basin
+        mirrored = not basin.periodic
+        shape = padded_shape(basin)
+        self._spectrum: wp.array = wp.array(_spectrum(basin), dtype=wp.vec2d, device=device)
+        self._modes = wp.zeros((basin.rows, shape[1]), dtype=wp.vec2d, device=device)
+        self._turned = wp.zeros((basin.columns, shape[0]), dtype=wp.vec2d, device=device)
+        self.surface = wp.zeros((basin.rows, basin.columns), dtype=wp.float64, device=device)
+        turns = np.pi if mirrored else 2.0 * np.pi
+        wavenumbers = wp.vec2d(turns / basin.size[0], turns / basin.size[1])
+        dispersion = Dispersion()
+        dispersion.gravity, dispersion.tension, dispersion.depth = GRAVITY, basin.tension, basin.depth
+
+        def record(kernel: Any, dim: tuple[int, ...], inputs: list[Any], out: wp.array, block: int = 256) -> Any:
+            return wp.launch(
+                kernel, dim=dim, inputs=inputs, outputs=[out], device=device, block_dim=block, record_cmd=True
+            )
+
+        self._evolve = record(make_evolve(mirrored), self._modes.shape,
+                              [self._spectrum, wavenumbers, dispersion, wp.float64(0.0)], self._modes)  # fmt: skip
+        self._launches = [self._evolve]
+        for array, following in ((self._modes, self._turned), (self._turned, None)):
+            rows, length = array.shape
+            block = fft_block(length, device)
+            self._launches.append(record(make_fft_rows(length, True), (rows, block), [], array, block))
+            if following is not None:
+                self._launches.append(record(make_turn(mirrored), following.shape, [array], following))
+        self._launches.append(record(spectral_surface, self.surface.shape, [self._turned], self.surface))
+
+    def advance(self, time: float) -> None:
+        """Make the surface of a time [s], any time."""
+        self._evolve.set_param_by_name("time", wp.float64(time))
+        for launch in self._launches:
+            launch.launch()
+
+
+def padded_shape(basin: Basin) -> tuple[int, int]:
+    """Lengths of the transforms along y and x: between walls, twice the cells."""
+    factor = 1 if basin.periodic else 2
+    return factor * basin.rows, factor * basin.columns
+
+
+def _spectrum(basin: Basin) -> np.ndarray:
+    """Modes of the drops at time 0, ``[rows, columns, 2]``, so that their plain sum is the surface.
+
+    Made once, on the host. Between walls a mode is the factor of a product of cosines, the one along x already with
+    the phase of its sum.
+    """
+    row_profiles, column_profiles = drop_profiles(basin)
+    if basin.periodic:
+        spectrum = np.fft.fft(row_profiles).T @ np.fft.fft(column_profiles) / (basin.rows * basin.columns)
+    else:
+        phase = np.exp(0.5j * np.pi * np.arange(basin.columns) / basin.columns)
+        spectrum = (_cosines(row_profiles).T @ _cosines(column_profiles)) * phase
+    return np.ascontiguousarray(np.stack([spectrum.real, spectrum.imag], axis=-1))
+
+
+def _cosines(values: np.ndarray) -> np.ndarray:
+    """Factors c of ``values[:, n] = sum_k c[:, k] cos(pi k (n + 1/2) / N)``, by the transform of twice the length."""
+    count = values.shape[1]
+    doubled = np.fft.fft(np.concatenate([values, values[:, ::-1]], axis=1))[:, :count]
+    factors = (doubled * np.exp(-0.5j * np.pi * np.arange(count) / count)).real / count
+    factors[:, 0] *= 0.5
+    return factors
