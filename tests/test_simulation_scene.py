@@ -14,6 +14,7 @@ import warp_caustics as wc
 from oracle.cases import sunlight
 from warp_caustics.assets import load_assets
 from warp_caustics.facts import gather_facts
+from warp_caustics.reference import make_reference
 from warp_caustics.simulation import step_launches
 from warp_caustics.water import GRAVITY, water_heights
 
@@ -75,6 +76,21 @@ def test_a_simulated_standing_wave_lights_as_the_same_waves_do(device, method):
     assert not simulated.warnings
     assert np.ptp(expected.caustic_map) > 0.3
     assert relative_l2(simulated.caustic_map, expected.caustic_map) < INTERPOLATION
+
+
+def test_the_reference_takes_water_as_it_is_simulated(device):
+    made = [make_reference(what, TIME, tolerance=2e-3, device=device, cache=False) for what in (standing(), as_waves())]
+    assert relative_l2(made[0].caustic_map, made[1].caustic_map) < INTERPOLATION
+
+
+def test_the_reference_sees_the_walls_of_a_basin(device):
+    """Water that ends inside the window: what is lit, and what would be from beyond, are the beam's own."""
+    what = scene(simulation={**SPECTRAL, "origin": (0.0, 0.0), "size": (2.0, 1.12)})
+    made, drawn = make_reference(what, TIME, tolerance=2e-3, cache=False), render(what, "beam", device, TIME)
+    assert np.ptp(drawn.caustic_map) > 0.3
+    assert relative_l2(drawn.caustic_map, made.caustic_map) < 1e-2
+    assert made.energy.missed_by_window == pytest.approx(drawn.energy.missed_by_window, rel=1e-6)
+    assert made.energy.missed_by_window > 0.0
 
 
 def test_a_simulated_standing_wave_with_shadows_lights_as_the_same_waves_do(device):
