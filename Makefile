@@ -11,7 +11,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 help:
 	@echo "make demo   render the bundled beach into $(OUT)/"
 	@echo "make test   run the whole test suite"
-	@echo "make bench  measure error, time and memory into bench/results/, some minutes"
+	@echo "make bench  measure error, time and memory into bench/results/, half an hour"
 	@echo "make lint   ruff and mypy"
 	@echo "make clean  remove what the other targets made, except $(VENV)/"
 
@@ -22,10 +22,15 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed-test
 	$(BIN)/python -m pytest
 
+# Half an hour on two cores. Mitsuba is measured where it is installed (`pip install '.[peer]'`).
 bench: $(VENV)/.installed-test
-	$(BIN)/python bench/compare_scenes.py
-	$(BIN)/python -m pytest bench --benchmark-only \
-	  --benchmark-json="$$($(BIN)/python bench/compare_scenes.py --folder)/frames.json"
+	@set -e; folder="$$($(BIN)/python bench/compare_scenes.py --folder)"; \
+	  $(BIN)/python bench/compare_scenes.py; \
+	  $(BIN)/python -m pytest bench --benchmark-only --benchmark-json="$$folder/frames.json"; \
+	  $(BIN)/python bench/leaving_out.py -o "$$folder/leaving_out"; \
+	  $(BIN)/python bench/stability/run.py -o "$$folder/stability"; \
+	  $(BIN)/python bench/stability/stiff.py -o "$$folder/stability"; \
+	  $(BIN)/python bench/ratio.py -o "$$folder/ratio"
 
 lint: $(VENV)/.installed-lint
 	$(BIN)/ruff check .

@@ -27,7 +27,7 @@ from oracle.cases import sunlight
 
 FRAMES = 7
 THREADS = 2
-RESULTS = Path(__file__).parent / "results" / "leaving_out"
+RESULTS = Path("out/leaving_out")
 
 STEEP = [wave(0.8 / 6.0, 6.0, 0.0)]
 EYE = {"position": (2.0, -1.5, 3.2), "target": (2.0, 2.0, 0.0), "vertical_fov": 50.0, "resolution": (320, 180)}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import warp_caustics as wc
 
-PIXELS = {"pool": 512}
-"""Columns and rows; the pool's are those that every published figure of this project is quoted on."""
+PIXELS = {"pool": 512, "beach": 512}
+"""Columns and rows, where they are the scene's own; every published figure of this project is quoted on the pool."""
 
 OTHER_PIXELS = 128
-"""Where light is traced ray by ray the reference takes a minute at this size."""
+"""Where light is traced ray by ray, on steep terrain and meshes, the reference takes a minute at this size."""
 
 SCENES: dict[str, wc.Scene] = {
     name: wc.load_scene(name).at_resolution(*(2 * (PIXELS.get(name, OTHER_PIXELS),))) for name in wc.bundled_scenes()

@@ -29,7 +29,7 @@ SWEEPS: dict[str, tuple[Callable[[], Iterator[Row]], ...]] = {
 }
 """By name: what goes to its extreme in one sweep."""
 
-RESULTS = Path(__file__).parents[1] / "results" / "stability"
+RESULTS = Path("out/stability")
 
 
 def main() -> int:
