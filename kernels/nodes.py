@@ -19,7 +19,11 @@ def stencil_weight(offset: int) -> wp.float64:
 
 @functools.cache
 def make_nodes(periodic: bool) -> wp.Kernel:
-    """Make the nodes of water that repeats, or is mirrored at its walls; one thread a node."""
+    """Make the nodes of water that repeats, or is mirrored at its walls; one thread a node.
+
+    Water between walls has a ring of nodes beyond them: a wall stands half a cell past the last cell's middle, and the
+    surface reaches it level.
+    """
 
     @wp.func
     def folded(index: int, count: int) -> int:
@@ -39,22 +43,28 @@ def make_nodes(periodic: bool) -> wp.Kernel:
         nodes_out: wp.array2d[wp.vec4],
     ):
         row, column = wp.tid()
+        j = row
+        i = column
+        if wp.static(not periodic):
+            j = row - 1
+            i = column - 1
         rows, columns = surface.shape[0], surface.shape[1]
         along = wp.float64(0.0)
         across = wp.float64(0.0)
         twist = wp.float64(0.0)
-        for i in range(-2, 3):
-            if i != 0:
-                weight = stencil_weight(i)
-                c = folded(column + i, columns)
-                along += weight * surface[row, c]
-                across += weight * surface[folded(row + i, rows), column]
+        here = surface[folded(j, rows), folded(i, columns)]
+        for right in range(-2, 3):
+            if right != 0:
+                weight = stencil_weight(right)
+                c = folded(i + right, columns)
+                along += weight * surface[folded(j, rows), c]
+                across += weight * surface[folded(j + right, rows), folded(i, columns)]
                 inner = wp.float64(0.0)
-                for j in range(-2, 3):
-                    if j != 0:
-                        inner += stencil_weight(j) * surface[folded(row + j, rows), c]
+                for up in range(-2, 3):
+                    if up != 0:
+                        inner += stencil_weight(up) * surface[folded(j + up, rows), c]
                 twist += weight * inner
-        nodes_out[row, column] = wp.vec4(float(surface[row, column]), float(along), float(across), float(twist))
+        nodes_out[row, column] = wp.vec4(float(here), float(along), float(across), float(twist))
 
     return nodes
 

@@ -217,6 +217,7 @@ def make_photon(spec: Spec) -> wp.Function:
     land = make_land(spec)
     shore = spec.shore
     faces_away = spec.faces_away
+    past_bounds = spec.declared and not spec.faces_away  # no part should face away, and one may
     shades = spec.self_shadow or spec.shore or spec.occluders
 
     @wp.func
@@ -227,6 +228,11 @@ def make_photon(spec: Spec) -> wp.Function:
         point = wp.vec2(0.0, 0.0)
         incident = facing(sun, slope)
         result = land(scene, sun, origin, slope, incident)
+        if wp.static(past_bounds):
+            if incident <= 0.0:
+                result.state = LOST
+                result.incident = -sun[2]
+                result.transmitted = -sun[2]
         if result.state == LOST:
             return result
         if wp.static(shades):

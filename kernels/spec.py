@@ -11,6 +11,8 @@ class Spec:
     ----------
     water : str
         ``"waves"`` (a sum of sines), ``"grid"`` (a height map) or ``"periodic"`` (one that repeats without end).
+    declared : bool
+        The bounds of the water are declared, not known, as of a simulation: light that is past them is dropped.
     receiver : str
         ``"plane"``, ``"waves"`` (terrain in closed form), ``"grid"`` (terrain from a file) or ``"mesh"``.
     objects : bool
@@ -44,6 +46,7 @@ class Spec:
     """
 
     water: str = "waves"
+    declared: bool = False
     receiver: str = "plane"
     objects: bool = False
     bounded: bool = False

@@ -20,6 +20,7 @@ import warp_caustics as wc
 from warp_caustics.cli import main
 from warp_caustics.comparison import machine, measure, run, settings
 from warp_caustics.comparison.measure import enough
+from warp_caustics.comparison.picture import draw
 from warp_caustics.comparison.record import load_comparison
 from warp_caustics.scene import BeamSettings, GatherSettings, PhotonSettings
 
@@ -336,12 +337,28 @@ def test_an_interrupt_leaves_nothing(scene_file, tmp_path, capfd, monkeypatch):
 def test_an_interrupt_while_files_are_written_waits_for_their_end(scene_file, tmp_path, monkeypatch):
     from warp_caustics.comparison import picture
 
-    draw = picture.draw
+    as_drawn = picture.draw
 
     def interrupted(comparison):
         signal.raise_signal(signal.SIGINT)
-        return draw(comparison)
+        return as_drawn(comparison)
 
     monkeypatch.setattr(picture, "draw", interrupted)
     assert main(["compare", str(scene_file), "--methods", "photon", "-o", str(tmp_path / "out")]) == 130
     assert files(tmp_path / "out") == {"compare.json", "compare.png"}
+
+
+def test_a_name_with_signs_of_mathematics_is_drawn_as_it_is(pool, tmp_path):
+    odd = pool.model_copy(update={"name": "a$^$b"})
+    assert all(path.is_file() for path in wc.compare(odd, methods="beam", device="cpu", threads=1).save(tmp_path))
+
+
+def test_errors_of_nothing_stay_in_the_picture(pool):
+    comparison = wc.compare(pool, methods=["beam"], device="cpu", threads=1)
+    rows = [row.model_copy(update={"errors": row.errors.model_copy(update={"relative_l2": 0.0})})
+            for row in comparison.rows]  # fmt: skip
+    exact = comparison.reference.model_copy(update={"error_bar": 0.0})
+    axes = draw(comparison.model_copy(update={"rows": rows, "reference": exact})).axes[0]
+    low, high = axes.get_ylim()
+    for line in axes.lines:
+        assert ((low < line.get_ydata()) & (line.get_ydata() < high)).all()

@@ -11,6 +11,7 @@ from scenery import ANY_SUN, GENTLE, IOR, refracted, relative_l2, sample_points,
 
 import warp_caustics as wc
 from oracle import CASES, first_focus_depth, flat_water_irradiance, load_reference, sine_irradiance
+from oracle.cases import sunlight
 from warp_caustics.reference import jittered_photons, make_reference
 
 EXACT = 1e-9  # float64 over some thousands of additions
@@ -182,3 +183,54 @@ def test_it_shares_no_kernel_with_what_it_judges():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.level >= 2:
                 assert (node.module, [name.name for name in node.names]) == ("spec", ["Spec"]), path.name
+
+
+def test_water_finer_than_a_pixel_is_not_agreed_upon_by_accident(device):
+    """Waves of half a pixel: on a mesh of one and two cells a pixel every corner meets the same phase."""
+    columns, rows = 8, 4
+    k = 2.0 * np.pi / (0.5 * 2.0 / columns)
+    what = scene([wave(0.5 / k, k, 0.0)], direction=(0.6, 0.0, -0.8), resolution=(columns, rows), size=(2.0, 1.0))
+    made = reference(what, tolerance=1e-3, device=device)
+    fine = jittered_photons(what, per_side=64, device=device)
+    assert made.caustic_map.mean() == pytest.approx(fine.mean(), rel=2e-3)
+    assert relative_l2(fine, made.caustic_map) < 1e-2
+
+
+def test_an_object_smaller_than_a_cell_is_seen(device, tmp_path):
+    # On 20 x 14 pixels of a tenth of a metre, a box of 3 cm stands between the corners of the first cells.
+    box = {"mesh": save_box(tmp_path), "translate": (1.037, 0.537, 0.2), "scale": 0.03}
+    shared = {"size": (2.0, 1.4), "resolution": (20, 14)}
+    made, bare = (
+        reference(scene((), {"plane": 0.0, **more}, **shared), tolerance=5e-3, device=device)
+        for more in ({"objects": [box]}, {})
+    )
+    assert np.abs(made.caustic_map - bare.caustic_map).max() > 0.05
+    assert made.error_bar > 0.0
+
+
+def test_a_low_sun_casts_the_whole_shadow_of_what_stands_above_the_water(device, tmp_path):
+    # 1.2 m of box above the water under a sun of 3 degrees: the shadow is 23 m long, and the map lies in it at 15 m.
+    box = {"mesh": save_box(tmp_path), "translate": (0.0, 0.5, 0.0), "scale": 1.4}
+    low = sunlight(87.0, 0.0)
+    what = scene((), {"plane": 0.0, "objects": [box]}, low, level=0.2, origin=(15.0, 0.4), size=(0.4, 0.2),
+                 resolution=(8, 4))  # fmt: skip
+    for method in ("beam", "photon", "reference"):
+        result = wc.render(what, method=method, device=device)
+        assert result.caustic_map.max() == 0.0, method
+        assert result.energy.blocked > 0.0, method
+
+
+def test_the_error_bar_covers_dry_land(device):
+    """Shadows of hills on land above the water: the whole map is land, and its bar is not that of no water."""
+    hills = [wave(0.3, 4.0, 2.0, 0.4), wave(0.2, -3.0, 5.0, 1.0)]
+    floor = {"terrain": {"base": 3.0, "slope": (0.3, -0.2), "waves": hills}}
+    what = scene((), floor, sunlight(70.0), resolution=(12, 8))
+    loose, tight = reference(what, tolerance=5e-2, device=device), reference(what, tolerance=2e-3, device=device)
+    assert 0.0 < tight.error_bar <= 2e-3
+    assert relative_l2(loose.caustic_map, tight.caustic_map) < 2.0 * loose.error_bar
+
+
+def test_more_rays_than_can_be_walked_are_refused_by_the_plan():
+    far = scene(GENTLE, direction=(0.8, 0.1, -0.6), level=3e4, size=(0.05, 0.05), resolution=(64, 64))
+    with pytest.raises(wc.InputError, match=r"rays|cells of water"):
+        wc.make_plan(far, method="reference", device="cpu")

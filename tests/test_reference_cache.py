@@ -7,7 +7,7 @@ import pytest
 from scenery import GENTLE, sample_points, save_heights, scene
 
 from warp_caustics.reference import make_reference
-from warp_caustics.reference.cache import FOLDER_VARIABLE
+from warp_caustics.reference.cache import FOLDER_VARIABLE, load
 
 
 @pytest.fixture
@@ -76,3 +76,37 @@ def test_a_folder_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     blocked.write_text("in the way")
     monkeypatch.setenv(FOLDER_VARIABLE, str(blocked / "cache"))
     assert not make_reference(scene(GENTLE), tolerance=LOOSE, device="cpu").cached
+
+
+def test_the_same_file_in_another_place_is_the_same(folder, tmp_path):
+    z = 0.01 * np.random.default_rng(1).normal(size=(12, 12))
+    for name, cached in (("one", False), ("two", True)):
+        water = save_heights(tmp_path, name, z, (-2.0, -2.0), (6.0, 6.0))
+        made = make_reference(scene(height_map=water, resolution=(8, 6)), tolerance=LOOSE, device="cpu")
+        assert made.cached == cached
+
+
+def test_the_shape_of_a_file_counts(folder, tmp_path):
+    z, made = 0.01 * np.random.default_rng(1).normal(size=(8, 18)), []
+    for shape in ((8, 18), (12, 12)):
+        water = save_heights(tmp_path, "water", z.reshape(shape), (-2.0, -2.0), (6.0, 6.0))
+        made.append(make_reference(scene(height_map=water, resolution=(8, 6)), tolerance=LOOSE, device="cpu"))
+    assert not made[1].cached
+
+
+def test_an_archive_of_something_else_is_made_again(folder):
+    make_reference(scene(GENTLE), tolerance=LOOSE, device="cpu")
+    (entry,) = folder.iterdir()
+    np.savez(entry, other=np.zeros(3))
+    assert not make_reference(scene(GENTLE), tolerance=LOOSE, device="cpu").cached
+
+
+def test_no_flipped_byte_brings_it_down(folder):
+    made = make_reference(scene(GENTLE, resolution=(4, 3)), tolerance=LOOSE, device="cpu")
+    (entry,) = folder.iterdir()
+    whole = entry.read_bytes()
+    for at in np.random.default_rng(2).integers(0, len(whole), 200):
+        entry.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
+        load(entry.stem)  # raises nothing
+    entry.write_bytes(whole)
+    assert load(entry.stem)["error_bar"] == made.error_bar

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 from scenery import scene
 
 import warp_caustics as wc
-from warp_caustics.simulation import Basin, SimulatedWater, make_basin
-from warp_caustics.simulation.basin import SAFE_SHARE
-from warp_caustics.simulation.chebyshev import SOLVER_TOLERANCE
+from warp_caustics.simulation import Basin, SimulatedWater, make_basin, step_launches
+from warp_caustics.simulation.basin import MOST_ITERATIONS, SAFE_SHARE, implicit_iterations
+from warp_caustics.simulation.chebyshev import SOLVER_TOLERANCE, chebyshev_count
 from warp_caustics.water import GRAVITY
 
 # Sums of a few thousand float64, relative to the drop's height.
@@ -249,6 +250,36 @@ def test_a_step_past_the_limit_is_refused_with_the_limit():
     assert fine / finer == pytest.approx(4.0, rel=0.01)
 
 
+def test_a_step_of_too_many_iterations_is_refused_with_the_longest():
+    stiff = {"kind": "grid", "integrator": "implicit", "resolution": (8, 6), "drops": []}
+    for step in (1e6, 1e12, 1e18):
+        with pytest.raises(wc.InputError, match=r"^water.simulation.step: .* iterations .* 32,768 ") as refused:
+            basin(**stiff, step=step)
+        longest = float(re.search(r"expected (\S+) s at most", str(refused.value))[1])
+    assert implicit_iterations(basin(**stiff, step=longest)) > 0.99 * MOST_ITERATIONS
+    with pytest.raises(wc.InputError, match=f"expected {longest:.6g} s at most"):
+        basin(**stiff, step=1.001 * longest)
+    # In cells of a micrometre, surface tension makes the default too long.
+    assert implicit_iterations(basin(**{**stiff, "size": (8e-6, 6e-6)})) <= MOST_ITERATIONS
+
+
+@pytest.mark.parametrize("stiffness", [1e-300, 0.1, 1e4, 1e12])
+def test_the_count_of_iterations_is_that_of_chebyshev_s_bound(stiffness):
+    """The residual's bound 1 / T_n(centre) falls below the tolerance with the last of them, and not before."""
+    count = chebyshev_count(stiffness)
+    turned = np.arccosh(1.0 + 2.0 / np.longdouble(stiffness))
+    wanted = np.arccosh(np.longdouble(max(stiffness, 1.0) / SOLVER_TOLERANCE))
+    assert count * turned >= wanted
+    assert count == 1 or (count - 1) * turned < wanted
+    assert chebyshev_count(1e20) > 1e10  # 1 + 2e-20 would be 1
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_launches_of_a_step_are_those_of_its_passes(kind):
+    of = basin(**KINDS[kind])
+    assert of.step_launches == step_launches(of)
+
+
 @pytest.mark.parametrize("times", [1.0, 30.0, 1000.0])
 def test_the_implicit_integrator_is_stable_at_any_step(device, times):
     """It gives and takes no energy, whatever the step; obstacles and all."""
@@ -300,6 +331,30 @@ def test_a_time_between_steps_shows_the_nearest(device, kind):
     assert (surface_at(water, 7.6 * step) != exact).any()
 
 
+@pytest.mark.parametrize("kind", ["explicit", "implicit"])
+def test_an_interrupted_step_leaves_nothing_behind(device, kind, monkeypatch):
+    drops = [*ONE_DROP, {**ONE_DROP[0], "time": 0.05}]
+    water = SimulatedWater(basin(**KINDS[kind], drops=drops), device)
+    expected = surface_at(water, 0.1)
+    surface_at(water, 0.06)
+    step, left = water.motion._step, [3]
+    names = ("height", "velocity", "_pressure", *(("_mean", "_change") if kind == "implicit" else ()))
+
+    def interrupted() -> None:
+        left[0] -= 1
+        if not left[0]:
+            water.motion._push.launch()
+            for name in names:
+                getattr(water.motion, name).fill_(np.nan)
+            raise KeyboardInterrupt
+        step()
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(water.motion, "_step", interrupted)
+        water.advance(0.1)
+    assert surface_at(water, 0.1).tobytes() == expected.tobytes()
+
+
 # --- drops ----------------------------------------------------------------------------------------------------------
 
 
@@ -311,6 +366,27 @@ def test_a_drop_is_a_gaussian_at_rest(device, kind):
     start = surface_at(SimulatedWater(of, device), 0.0)
     np.testing.assert_allclose(start, bump, atol=1e-2 * bump.max())  # the walls mirror its foot
     np.testing.assert_allclose(start[5:, :20], bump[5:, :20], atol=1e-6 * bump.max())
+
+
+@pytest.mark.parametrize(
+    ("border", "drop", "height"),
+    [
+        ("reflecting", {"position": (0.31, 0.17), "radius": 0.02}, 1.0),
+        ("reflecting", {"position": (0.64, 0.17), "radius": 0.02}, 2.0),
+        ("reflecting", {"position": (0.0, 0.32), "radius": 0.02}, 4.0),
+        ("reflecting", {"position": (0.31, 0.02), "radius": 0.04}, 1.0 / np.exp(0.25) * 2.0),  # highest at the wall
+        ("reflecting", {"position": (0.31, 0.17), "radius": 1.28}, 8.0 * np.pi),  # the mean of a wide one, by area
+        ("periodic", {"position": (0.0, 0.0), "radius": 0.02}, 1.0),
+        ("periodic", {"position": (9.0, -4.0), "radius": 0.64}, 2.0 * np.pi),
+    ],
+)
+def test_the_height_that_is_planned_for_is_that_of_the_drops_and_their_images(device, border, drop, height):
+    of = basin(kind="spectral", resolution=(128, 64), border=border, drops=[{**drop, "amplitude": -0.003}])
+    bound, water = of.settings.height_bound, SimulatedWater(of, device)
+    assert bound == pytest.approx(0.003 * height, rel=2e-3)
+    highest = np.abs(surface_at(water, 0.0)).max()
+    assert 0.9 * bound < highest <= bound
+    assert not [note for note in water.warnings() if "height" in note]
 
 
 @pytest.mark.parametrize("kind", ["explicit", "implicit"])

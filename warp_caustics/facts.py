@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     from .scene import Scene
 
 
+SPARE_WAY = 4.0
+"""Times the longest way that rays to a mesh are followed; it costs nothing, and spares a proof for each corner."""
+
+
 @dataclass(frozen=True)
 class Facts:
     """All that a plan needs to know of a scene.
@@ -51,6 +55,13 @@ class Facts:
     def sun_share(self) -> float:
         """Irradiance of one direction of the sun, where the whole disk gives 1 on a plane that faces its middle."""
         return float(1.0 / (self.suns @ self.scene.sun.unit_direction).sum())
+
+    @property
+    def longest_ray(self) -> float:
+        """Longest way to a mesh [m]: down through the water, or up to the top of what shades it from the lowest sun."""
+        down = self.longest_way + self.ground.highest - self.ground.lowest
+        up = (max(self.ground.highest, 0.0) + self.amplitude) / -float(self.suns[:, 2].max())
+        return SPARE_WAY * max(down, up)
 
     @property
     def water_border(self) -> tuple[np.ndarray, np.ndarray] | None:

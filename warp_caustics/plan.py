@@ -13,7 +13,7 @@ from .kernels.deposit import ACCUMULATOR
 from .kernels.ledger import BINS, ENTRIES
 from .magnitude import check_asset_magnitudes, check_magnitudes
 from .methods import METHODS
-from .program import Buffer, Program
+from .program import MOST_WORK, Buffer, Program
 from .scene import Scene, known_method, load_scene
 from .simulation import SimulationPass, frame_launches, simulation_buffers, simulation_passes, step_launches
 from .window import TOO_FAR
@@ -28,9 +28,6 @@ WAVE_BYTES, SUN_BYTES = 16, 20
 
 MOST_VALUES = 2**31 - 1
 """Values of one array at most, in Warp."""
-
-MOST_WORK = 2**33
-"""Cells in a frame at most, all directions of the sun together: a core goes through them in a day."""
 
 LONG_WORK = 2**27
 """Cells in a frame past which it takes minutes, and the plan says so."""
@@ -182,9 +179,9 @@ def make_plan(
     check_asset_magnitudes(assets)
     facts = gather_facts(scene, assets)
     if name == "reference":
-        from .reference.plan import ReferencePlan
+        from .reference.plan import plan_reference
 
-        return ReferencePlan(device, resolve_threads(threads, device), facts, facts.warnings)
+        return plan_reference(facts, device, resolve_threads(threads, device), free_memory(device))
     program = METHODS[name](facts)
     check_work(facts, program)
     lanes = min(resolve_threads(threads, device), program.strips * len(facts.suns)) if program.banded else 1
@@ -194,11 +191,26 @@ def make_plan(
         # Each thread has a map of its own; with fewer there may be room.
         plan = replace(plan, threads=1)
     if plan.bytes > SPARE_MEMORY * free:
-        raise InputError(
-            f"map: {scene.map.resolution[0]} x {scene.map.resolution[1]} pixels by method {name} take {plan.bytes:,} "
-            f"bytes, and {device} has {free:,} free; lower map.resolution" + (" or threads" if lanes > 1 else "")
-        )
+        raise InputError(_too_large(plan, free) + (" or threads" if lanes > 1 else ""))
     return plan
+
+
+def _too_large(plan: Plan, free: int) -> str:
+    """Say what takes the most of a plan that does not fit in memory."""
+    scene, basin = plan.facts.scene, plan.facts.basin
+    room = f"and {plan.device} has {free:,} free; "
+    if basin is not None:
+        water = sum(buffer.bytes for buffer in simulation_buffers(basin))
+        if 2 * water > plan.bytes:
+            key = "resolution" if basin.settings.cell is None else "cell"
+            return (
+                f"water.simulation.{key}: {basin.columns} x {basin.rows} cells take {water:,} bytes of {plan.bytes:,}, "
+                f"{room}expected fewer cells"
+            )
+    return (
+        f"map: {scene.map.resolution[0]} x {scene.map.resolution[1]} pixels by method {plan.method} take "
+        f"{plan.bytes:,} bytes, {room}lower map.resolution"
+    )
 
 
 def check_map_fits(scene: Scene, device: str, free: int) -> None:

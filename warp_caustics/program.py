@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from .window import Lattice
 
 
+MOST_WORK = 2**33
+"""Cells in a frame at most, all directions of the sun together: a core goes through them in a day."""
+
 MOST_JOBS = 4096
 """Strips times directions of the sun at most: each is recorded, at 4 KB and a tenth of a millisecond a launch."""
 

@@ -143,7 +143,7 @@ class Renderer:
             energy=energy,
             seconds=self._seconds + waited,
             assets=facts.assets,
-            notes=() if self._state.simulated is None else tuple(self._state.simulated.warnings()),
+            notes=() if self._state.simulated is None else self._state.simulated.warnings(),
         )
 
     def _allocate(self) -> None:
@@ -242,7 +242,7 @@ def make_renderer(
     """
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
-    if (method or scene.method.name) == "reference":
+    if (scene.method.name if method is None else method) == "reference":
         from .reference.renderer import ReferenceRenderer
 
         return ReferenceRenderer(scene, device, threads)

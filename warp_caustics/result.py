@@ -103,12 +103,12 @@ class Result:
         emitted, over_lit = np.max(self.energy.emitted), np.max(self.energy.over_lit)
         if over_lit > OVER_LIT_LIMIT * emitted:
             notes.append(
-                f"water.self_shadow is false, and {over_lit / emitted:.1%} of the light enters twice, "
+                f"water: its shadows are off, and {over_lit / emitted:.1%} of the light enters twice, "
                 "through crests and again behind them"
             )
         dropped = np.max(self.energy.dropped)
         if dropped > 0.0:
-            notes.append(f"{dropped / emitted:.1e} of the light had no finite path and was dropped")
+            notes.append(f"{dropped / emitted:.1e} of the light had no path that is known, and was dropped")
         if self.energy.unaccounted > LOST_LIMIT:
             notes.append(
                 f"method.accumulate: the map's sums are off by {self.energy.unaccounted:.1e} of the light; "

@@ -73,6 +73,7 @@ def specify(scene: Scene, assets: Assets, light: Light, ground: Bounds) -> Spec:
     absorbs = by_depth or bool(np.any(medium.absorption))
     return Spec(
         water=water_kind(scene, assets),
+        declared=scene.water.simulation is not None,
         receiver=kind,
         objects=assets.objects is not None,
         bounded=water_kind(scene, assets) == "grid",

@@ -96,7 +96,7 @@ class SceneState:
         step = max(PIXELS_A_STEP * float(facts.pixel.min()), facts.longest_way / STEPS_A_WAY)
         scene.water.surface = self._surface(facts.assets.water, self._waves)
         if self.simulated is not None:
-            scene.water.surface.grid = self._grid(self.simulated.nodes, self.simulated.basin)
+            scene.water.surface.grid = self._simulated_grid(self.simulated)
         scene.water.amplitude = facts.amplitude
         scene.water.slope = facts.slope
         scene.water.step = step
@@ -107,7 +107,7 @@ class SceneState:
         receiver.lowest, receiver.highest = ground.lowest, ground.highest
         receiver.slope = ground.slope if np.isfinite(ground.slope) else 0.0
         receiver.step = step
-        receiver.reach = 4.0 * (facts.longest_way + ground.highest - ground.lowest)
+        receiver.reach = facts.longest_ray
         if facts.spec.receiver == "plane":
             receiver.level = ground.lowest if not facts.spec.objects else self._plane_level()
         receiver.terrain = self._terrain()
@@ -152,6 +152,16 @@ class SceneState:
         made.nodes = nodes
         made.origin = wp.vec2(*(np.subtract(placed.origin, self._facts.scene.map.origin) + 0.5 * cell))
         made.per_metre = wp.vec2(*(1.0 / cell))
+        return made
+
+    def _simulated_grid(self, water: SimulatedWater) -> Grid:
+        """The kernels' form of simulated water; of water that repeats, the rectangle that is nearest to the map."""
+        basin = water.basin
+        low = np.subtract(basin.origin, self._facts.scene.map.origin)
+        if basin.periodic:
+            low = low - np.asarray(basin.size) * np.round(low / basin.size)
+        made, cell = self._grid(water.nodes, basin), np.asarray(basin.cell)
+        made.origin = wp.vec2(*(low + (0.5 - water.ring) * cell))
         return made
 
     def _mesh(self, mesh: TriangleMesh | None) -> Any:

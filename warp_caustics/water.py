@@ -25,9 +25,9 @@ EDGE_POINTS = 8
 RADII = np.linspace(0.0, 1.0, 9)
 """Where, from no slope to the farthest, refraction is tried for its bounds."""
 
-BETWEEN_SAMPLES = 0.05
+BETWEEN_SAMPLES = 0.25
 """Share by which a simulation's bound of slope is widened: slopes are measured at nodes and half-way between them, and
-a drop one cell wide is 4 % steeper in some other place."""
+a parabola through three samples of a slope may rise that far above the largest."""
 
 LONGEST_TIME = 1e9
 """Latest time [s], 32 years, at which a phase of float64 is still right to 1e-6 rad."""

@@ -9,8 +9,17 @@ from .meet import make_meet
 from .ray import ENDLESS, World
 from .surface import make_field
 
-PARTS, SHORE_PARTS = 8, 32
-"""Points each way in a pixel at which land is looked at; a shore's pixel is then right to a thousandth."""
+EDGE = 4
+"""Times as many points, each way, in a pixel that an edge of water or of shadow crosses."""
+
+
+@wp.struct
+class Lit:
+    """What was found at the points of a pixel."""
+
+    dry: int  # points that are dry
+    lit: int  # of them, points in the sun
+    light: wp.float64  # summed
 
 
 @functools.cache
@@ -49,14 +58,19 @@ def make_land(spec: Spec) -> wp.Kernel:
         return (wp.float64(pixel) + (wp.float64(part) + wp.float64(0.5)) / wp.float64(parts)) * width
 
     @wp.func
-    def dry_parts(world: World, row: int, column: int, parts: int) -> int:
-        count = int(0)
+    def look(world: World, suns: wp.array[wp.vec3d], row: int, column: int, parts: int) -> Lit:
+        found = Lit()
         for j in range(parts):
             for i in range(parts):
                 x = part_of(column, i, parts, world.pixel[0])
-                if is_dry(world, x, part_of(row, j, parts, world.pixel[1])):
-                    count += 1
-        return count
+                y = part_of(row, j, parts, world.pixel[1])
+                if is_dry(world, x, y):
+                    light = light_at(world, suns, x, y)
+                    found.dry += 1
+                    found.light += light
+                    if light > wp.float64(0.0):
+                        found.lit += 1
+        return found
 
     @wp.kernel(module="unique", enable_backward=False)
     def reference_land(
@@ -65,25 +79,19 @@ def make_land(spec: Spec) -> wp.Kernel:
         suns: wp.array[wp.vec3d],
         first_row: int,
         columns: int,
+        parts: int,
         # Out:
         map_out: wp.array[wp.float64],
     ):
-        """One thread a pixel; launch dims (rows of a band, columns). A shore's pixel is looked at in more parts."""
+        """One thread a pixel; launch dims (rows of a band, columns)."""
         band_row, column = wp.tid()
         row = first_row + band_row
-        parts = int(wp.static(PARTS))
-        dry = dry_parts(world, row, column, parts)
-        if dry == 0:
-            return
-        if dry < parts * parts:
-            parts = int(wp.static(SHORE_PARTS))
-        total = wp.float64(0.0)
-        for j in range(parts):
-            for i in range(parts):
-                x = part_of(column, i, parts, world.pixel[0])
-                y = part_of(row, j, parts, world.pixel[1])
-                if is_dry(world, x, y):
-                    total += light_at(world, suns, x, y)
-        map_out[row * columns + column] = total / wp.float64(parts * parts)
+        count = parts
+        found = look(world, suns, row, column, count)
+        edge = found.dry < parts * parts or found.lit < found.dry
+        if found.dry > 0 and found.lit > 0 and edge:
+            count = wp.static(EDGE) * parts
+            found = look(world, suns, row, column, count)
+        map_out[row * columns + column] = found.light / wp.float64(count * count)
 
     return reference_land

@@ -64,9 +64,6 @@ def make_photons(spec: Spec, disk: bool) -> wp.Kernel:
         direction = sun.middle
         if wp.static(disk):
             direction = direction_of(sun, wp.float64(wp.randf(random)), wp.float64(wp.randf(random)))
-        # The part of a setting sun that is below the horizon gives nothing.
-        if direction[2] >= wp.float64(0.0):
-            return
         ray = trace(world, direction, x, y)
         inside = wp.float64(0.0)
         if ray.fate == LANDS or ray.fate == LANDS_ON_MESH:

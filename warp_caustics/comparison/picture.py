@@ -38,6 +38,9 @@ MARKER = 5.0
 
 POINTS_PER_INCH = 72.0
 
+LEAST_BAR = 1e-8
+"""Drawn for a reference that is exact, as of flat water: below float32 there is nothing to tell."""
+
 Box = tuple[float, float, float, float]
 
 
@@ -55,13 +58,14 @@ def draw(comparison: Comparison) -> Figure:
     figure = Figure(figsize=INCHES, dpi=DPI, layout="tight")
     FigureCanvasAgg(figure)
     axes = figure.add_subplot()
-    bar = comparison.reference.error_bar
+    bar = max(comparison.reference.error_bar, LEAST_BAR)
     shown = [row for row in comparison.rows if row.errors is not None and math.isfinite(row.errors.relative_l2)]
     points = [_point(row, bar) for row in shown]
     _scale(axes, points, bar)
     axes.axhspan(axes.get_ylim()[0], bar, color=BAR_COLOUR, zorder=0)
+    said = f"error bar of the reference, {comparison.reference.error_bar:.1e}: errors in here are ties"
     caption = axes.annotate(
-        f"error bar of the reference, {bar:.1e}: errors in here are ties", (1.0, 0.0), (-6, 5),
+        said, (1.0, 0.0), (-6, 5),
         xycoords="axes fraction", textcoords="offset points", ha="right", va="bottom", fontsize=LABEL_SIZE,
     )  # fmt: skip
     front = [_point(row, bar) for row in comparison.front]
@@ -86,9 +90,8 @@ def _point(row: Row, bar: float) -> tuple[float, float]:
 def _scale(axes: Axes, points: list[tuple[float, float]], bar: float) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
-    lowest = [bar * BELOW_THE_BAR] if bar > 0.0 else []
-    times, errors = [time for time, _ in points], [error for _, error in points if error > 0.0] + lowest
-    if times and errors:
+    times, errors = [time for time, _ in points], [*(error for _, error in points), BELOW_THE_BAR * bar]
+    if times:
         axes.set_xlim(min(times) / ROOM, max(times) * ROOM)
         axes.set_ylim(min(errors) / ROOM, max(errors) * ROOM)
 
@@ -108,8 +111,8 @@ def _describe(axes: Axes, comparison: Comparison) -> None:
     axes.set_title(
         f"{comparison.scene_name}, {columns} x {rows} pixels: error against time per frame\n"
         f"{where.device_name}{threads}; rings: on the front; figures: samples per pixel, or window N",
-        fontsize=11,
-    )
+        fontsize=11, parse_math=False,
+    )  # fmt: skip
     axes.set_xlabel("warm frame, median [ms]")
     axes.set_ylabel("relative L2 error (RMSE over mean)")
     axes.grid(True, which="major", color="#e6e8eb", lw=0.7, zorder=0)

@@ -185,10 +185,11 @@ class Comparison(Part):
         except OSError as error:
             raise InputError(f"the folder {str(folder)!r} cannot be made: {error.strerror or error}") from None
         files = [folder / f"{name}.json", folder / f"{name}.png"]
+        picture = draw(self)  # before anything is written
         with whole_file(files[0]) as temporary:
             temporary.write_text(self.to_json(), encoding="utf-8")
         with whole_file(files[1]) as temporary:
-            draw(self).savefig(temporary, format="png")
+            picture.savefig(temporary, format="png")
         return files
 
 

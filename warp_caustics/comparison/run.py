@@ -25,7 +25,7 @@ Tell = Callable[[int, int, str], None]
 
 def compare(
     scene: Scene | str | os.PathLike[str],
-    methods: Sequence[str] | None = None,
+    methods: Sequence[str] | str | None = None,
     device: str | None = None,
     threads: int | None = None,
     time: float = 0.0,

@@ -83,7 +83,7 @@ SERIES: dict[str, tuple[Series, ...]] = {
 """By method, what is tried. A method joins the comparison by its line here."""
 
 
-def chosen_methods(names: Sequence[str] | None) -> list[str]:
+def chosen_methods(names: Sequence[str] | str | None) -> list[str]:
     """Return the methods to compare, each once; all of them when left out.
 
     Raises
@@ -93,6 +93,8 @@ def chosen_methods(names: Sequence[str] | None) -> list[str]:
     """
     if names is None:
         return list(SERIES)
+    if isinstance(names, str):
+        names = [names]
     wanted = list(dict.fromkeys(name.strip() for name in names))
     unknown = [name for name in wanted if name not in SERIES]
     if unknown or not wanted:

@@ -19,7 +19,7 @@ from ..magnitude import check_asset_magnitudes, check_magnitudes
 from ..scene import Scene, load_scene
 from ..water import check_time
 from . import cache as disk
-from .converge import Budget, Level, converge
+from .converge import LAND_PARTS, Budget, Level, converge
 from .roads import Roads
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ class Reference:
         It took to compute.
     cached : bool
         Whether it was read from the disk.
+    notes : tuple of str
+        What is to be known of it.
     """
 
     caustic_map: np.ndarray
@@ -54,6 +56,7 @@ class Reference:
     samples: float
     seconds: float
     cached: bool
+    notes: tuple[str, ...] = ()
 
 
 def make_reference(
@@ -99,26 +102,18 @@ def make_reference(
     facts, device, threads = _prepared(scene, time, device, threads)
     settings = facts.scene.method.reference
     budget = Budget(settings.tolerance if tolerance is None else tolerance, settings.rays)
-    if not budget.tolerance > 0.0:
-        raise InputError(f"tolerance: expected a number above 0, got {tolerance}")
+    if not (budget.tolerance > 0.0 and np.isfinite(budget.tolerance)):
+        raise InputError(f"tolerance: expected a finite number above 0, got {tolerance}")
     name = disk.key(facts, time, budget)
     stored = disk.load(name) if cache else None
     if stored is not None:
-        return Reference(
-            caustic_map=stored["caustic_map"], energy=disk.unpack_energy(stored), error_bar=float(stored["error_bar"]),
-            samples=float(stored["samples"]), seconds=float(stored["seconds"]), cached=True,
-        )  # fmt: skip
+        return Reference(**stored, cached=True)
     start = perf_counter()
     roads = Roads(facts, time, device, threads)
-    land = roads.land()
-    level = converge(roads, facts, budget, land)
-    made = _reference(facts, level, land, perf_counter() - start)
+    level = converge(roads, facts, budget)
+    made = _reference(facts, level, roads.notes, perf_counter() - start)
     if cache:
-        disk.store(
-            name,
-            {"caustic_map": made.caustic_map, "error_bar": np.asarray(made.error_bar),
-             "samples": np.asarray(made.samples), "seconds": np.asarray(made.seconds), **disk.pack_energy(made.energy)},
-        )  # fmt: skip
+        disk.store(name, made)
     return made
 
 
@@ -149,7 +144,7 @@ def jittered_photons(
     """
     facts, device, threads = _prepared(scene, time, device, threads)
     roads = Roads(facts, time, device, threads)
-    return _map(facts, roads.photons(per_side, seed).flux, roads.land())
+    return _map(facts, roads.photons(per_side, seed).flux, roads.land(LAND_PARTS * per_side))
 
 
 def _prepared(
@@ -168,7 +163,8 @@ def _prepared(
     return gather_facts(scene, assets), device, resolve_threads(threads, device)
 
 
-def _reference(facts: Facts, level: Level, land: np.ndarray, seconds: float) -> Reference:
+def _reference(facts: Facts, level: Level, notes: tuple[str, ...], seconds: float) -> Reference:
+    land = level.land
     caustic_map = _map(facts, level.sums.flux, land)
     colours, area = np.asarray(facts.irradiance), float(np.prod(facts.pixel))
     entries = {name: value * colours for name, value in level.sums.ledger.items()}
@@ -178,7 +174,7 @@ def _reference(facts: Facts, level: Level, land: np.ndarray, seconds: float) -> 
     entries["dry"] = land.sum() * area * colours
     energy = Energy(**{name: float(value[0]) if len(colours) == 1 else value for name, value in entries.items()})
     samples = float(level.per_side**2 * max(level.directions, 1))
-    return Reference(caustic_map, energy, level.error_bar, samples, seconds, False)
+    return Reference(caustic_map, energy, level.error_bar, samples, seconds, False, notes)
 
 
 def _map(facts: Facts, flux: np.ndarray, land: np.ndarray) -> np.ndarray:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from ..errors import InputError
 from ..kernels.reference.cells import ARRIVED
 from ..kernels.reference.ledger import BINS, ENTRIES
+from ..program import MOST_WORK
+from ..window import TOO_FAR
+from .converge import first_work
 from .roads import STRIP_CORNERS
 
 if TYPE_CHECKING:
@@ -15,6 +19,9 @@ if TYPE_CHECKING:
 
 DOUBLE = 8
 """Bytes of a float64."""
+
+HOST_MAPS = 8
+"""Maps of the levels before, and of their differences."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,7 @@ class ReferencePlan:
         columns, rows = self.facts.scene.map.resolution
         channels = self.facts.spec.channels
         lane = columns * rows * channels + len(ENTRIES) * channels * BINS + STRIP_CORNERS * (ARRIVED + channels)
-        return self.threads * lane * DOUBLE
+        return (self.threads * lane + HOST_MAPS * columns * rows * channels) * DOUBLE
 
     def __str__(self) -> str:
         """Return the plan as text: kept, left out, why, bytes."""
@@ -73,3 +80,28 @@ class ReferencePlan:
         yield f"{len(self.kernels)} kernels ({', '.join(self.kernels)}), {self.bytes:,} bytes"
         for warning in self.warnings:
             yield f"warning: {warning}"
+
+
+def plan_reference(facts: Facts, device: str, threads: int, free: int) -> ReferencePlan:
+    """Plan the reference of a scene, where there is the time and the memory for it.
+
+    Raises
+    ------
+    InputError
+        If its first levels would take days, or its maps more than the ``free`` bytes.
+    """
+    work, plan = first_work(facts), ReferencePlan(device, threads, facts, facts.warnings)
+    if work > MOST_WORK:
+        raise InputError(
+            f"method.reference: its first levels take {work:,} rays, and {MOST_WORK:,} are what can be gone through; "
+            f"{TOO_FAR}"
+        )
+    if plan.bytes > free:
+        raise InputError(
+            f"map: {facts.scene.map.resolution[0]} x {facts.scene.map.resolution[1]} pixels by method reference take "
+            f"{plan.bytes:,} bytes, and {device} has {free:,} free; lower map.resolution or threads"
+        )
+    if work > facts.scene.method.reference.rays:
+        note = f"method.reference: its first levels take {work:,} rays, more than method.reference.rays"
+        return replace(plan, warnings=(*plan.warnings, note))
+    return plan

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,7 +44,7 @@ class ReferenceRenderer:
         plan = make_plan(scene, "reference", device, threads)
         assert isinstance(plan, ReferencePlan)
         self.plan = plan
-        self._made: tuple[float, Reference] | None = None
+        self._made: tuple[float, float, Reference] | None = None
 
     def render(self, time: float = 0.0) -> Frame:
         """Converge the map at a time [s], or read it from the disk.
@@ -56,9 +57,9 @@ class ReferenceRenderer:
         from ..renderer import Frame
         from . import make_reference
 
-        plan = self.plan
+        plan, start = self.plan, perf_counter()
         reference = make_reference(plan.facts.scene, time, device=plan.device, threads=plan.threads)
-        self._made = (time, reference)
+        self._made = (time, perf_counter() - start, reference)
         return Frame(wp.array(reference.caustic_map, dtype=wp.float32, device=plan.device), time)
 
     def result(self) -> Result:
@@ -66,7 +67,7 @@ class ReferenceRenderer:
         if self._made is None:
             self.render(0.0)
         assert self._made is not None
-        time, reference = self._made
+        time, seconds, reference = self._made
         settings = self.plan.facts.scene.method.reference
         plan = self.plan
         if reference.error_bar > settings.tolerance:
@@ -81,5 +82,6 @@ class ReferenceRenderer:
         return Result(
             scene=plan.facts.scene, method="reference", device=plan.device, time=time, plan=plan,
             caustic_map=reference.caustic_map.astype(np.float32), energy=reference.energy,
-            seconds=reference.seconds, assets=plan.facts.assets, error_bar=reference.error_bar,
+            seconds=seconds, assets=plan.facts.assets, error_bar=reference.error_bar,
+            notes=reference.notes,
         )  # fmt: skip

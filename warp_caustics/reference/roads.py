@@ -93,8 +93,16 @@ class Roads:
 
         return self._walk(self._strips(lattice, rows), lambda: None, walk, share)
 
-    def land(self) -> np.ndarray:
-        """Direct sunlight on dry land, by horizontal area at unit irradiance ``[rows, columns]``."""
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be known of the water that was walked."""
+        return self._owner.notes
+
+    def land(self, parts: int) -> np.ndarray:
+        """Direct sunlight on dry land, by horizontal area at unit irradiance ``[rows, columns]``.
+
+        Each pixel is looked at in ``parts`` by ``parts`` points, and in more where a shore or a shadow crosses it.
+        """
         facts = self._facts
         columns, rows = facts.scene.map.resolution
         if not facts.spec.shore:
@@ -105,7 +113,7 @@ class Roads:
 
         def light(first: int, own: None) -> None:
             band = min(LAND_ROWS, rows - first)
-            self._launch(kernel, (band, columns), [self._owner.world, suns, first, columns, made])
+            self._launch(kernel, (band, columns), [self._owner.world, suns, first, columns, parts, made])
 
         self._share(list(range(0, rows, LAND_ROWS)), lambda: None, light)
         return np.asarray(made.numpy()).reshape(rows, columns) * facts.sun_share
@@ -178,11 +186,10 @@ class Roads:
         return list(range(lattice.first[1], lattice.first[1] + lattice.count[1], rows))
 
     def _suns(self, directions: int) -> tuple[np.ndarray, float]:
-        """Directions of the disk that are above the horizon, and the irradiance of one."""
+        """Directions of the disk, and the irradiance of one."""
         sun = self._facts.scene.sun
         middle = np.asarray(sun.unit_direction, dtype=np.float64)
         suns = disk_directions(middle, np.radians(sun.angular_diameter) / 2.0, directions)
-        suns = suns[suns[:, 2] < 0.0]
         return suns, float(1.0 / (suns @ middle).sum())
 
     def _disk(self, half: float) -> Disk:

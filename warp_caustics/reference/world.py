@@ -12,8 +12,8 @@ from ..kernels.reference.meet import Mesh
 from ..kernels.reference.ray import World
 from ..kernels.reference.surface import HeightField, Sine
 from ..receiver import closed_terrain
-from ..simulation import simulated_surface
-from ..water import phases
+from ..simulation import bound_notes, simulated_surface
+from ..water import BETWEEN_SAMPLES, phases
 
 if TYPE_CHECKING:
     from ..assets import HeightGrid, TriangleMesh
@@ -33,11 +33,20 @@ ENDLESS = 1e30
 
 
 class DeviceWorld:
-    """A scene at a time, on a device; owns what its struct points to."""
+    """A scene at a time, on a device; owns what its struct points to.
+
+    Attributes
+    ----------
+    world : World
+        For kernels.
+    notes : tuple of str
+        What is to be known of it.
+    """
 
     def __init__(self, facts: Facts, time: float, device: str) -> None:
         self._facts, self._device = facts, device
         self._keep: list[Any] = []
+        self.notes: tuple[str, ...] = ()
         self.world = self._make(time)
 
     def _make(self, time: float) -> World:
@@ -75,6 +84,8 @@ class DeviceWorld:
         basin, grid = simulated_surface(facts.scene, facts.assets, time)
         field, hull = self._patches(grid, 0.0), surface_hull(grid)
         field.steepest, field.highest = hull.slope, max(abs(hull.lowest), abs(hull.highest))
+        # The hull's slope is a bound, not a value: it may pass the declared one by as much as is planned for anyway.
+        self.notes = bound_notes(basin, hull.slope / (1.0 + BETWEEN_SAMPLES), field.highest)
         field.low = wp.vec2d(*np.subtract(basin.origin, facts.scene.map.origin))
         field.period = wp.vec2d(*basin.size)
         field.step = self._step()
@@ -125,7 +136,7 @@ class DeviceWorld:
         made = Mesh()
         if mesh is None:
             return made
-        scene, ground = self._facts.scene, self._facts.ground
+        scene = self._facts.scene
         vertices = mesh.vertices - np.array([*scene.map.origin, scene.water.level])
         triangles = mesh.triangles.astype(np.int32)
         bvh = wp.Mesh(
@@ -135,8 +146,7 @@ class DeviceWorld:
         made.id = bvh.id
         made.vertices = self._array(vertices, wp.vec3d)
         made.triangles = self._array(triangles, wp.vec3i)
-        # The longest way under water is one of the flattest ray's; above it, the sun's own.
-        made.reach = 4.0 * (self._facts.longest_way + ground.highest - ground.lowest)
+        made.reach = self._facts.longest_ray
         return made
 
     def _array(self, values: np.ndarray, dtype: Any) -> Any:

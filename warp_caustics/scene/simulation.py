@@ -30,7 +30,7 @@ class Drop(Model):
 
 
 class Obstacle(Model):
-    """A wall that rises out of the water: a disc, or a box along the axes.
+    """A wall that rises out of the water: a disc, or a box along the axes. It covers the cells whose middles it covers.
 
     It reflects waves and casts no shadow: for that, stand a mesh of its shape on the receiver.
     """
@@ -63,30 +63,41 @@ class Simulation(Model):
     )
     origin: Pair | None = Field(
         default=None,
-        description="lower corner of the water [m]; by default it is all the water that can light the map",
+        description="lower corner of the water [m]; by default it is all the water that can light the map, so that "
+        "its walls move with the sun, max_slope and the drops: give origin and size for walls that stay",
     )
-    size: Extent | None = Field(default=None, description="extent of the water [m]; given together with origin")
+    size: Extent | None = Field(
+        default=None,
+        description="extent of the water [m]; given together with origin, for walls that stay",
+    )
     border: Annotated[Literal["reflecting", "periodic"], one_of("reflecting", "periodic")] = Field(
         default="reflecting", description="walls, at which the water ends; or water that repeats without end"
     )
     depth: Positive | None = Field(default=None, description="of the water [m]; by default that at rest over the map")
     surface_tension: NonNegative = Field(default=0.0728, description="σ [N/m]")
     density: Positive = Field(default=1000.0, description="ρ [kg/m³]")
-    drops: tuple[Drop, ...] = Field(default=(), description="what disturbs the water")
+    drops: tuple[Drop, ...] = Field(
+        default=(),
+        description="what disturbs the water. Walls mirror them, so that a drop at a wall stands twice as high, in a "
+        "corner four times; in periodic water those wider than it add up with their repeats",
+    )
     max_slope: Positive = Field(
         default=0.5, description="steepest slope that is planned for; a frame that passes it gives a warning"
     )
     max_height: Positive | None = Field(
         default=None,
-        description="largest displacement that is planned for [m]; by default that of all drops in one place",
+        description="largest displacement that is planned for [m]; by default that of all drops in one place, as "
+        "walls and repeats raise them where origin and size are given",
     )
     integrator: Annotated[Literal["explicit", "implicit"], one_of("explicit", "implicit")] = Field(
-        default="explicit", description="grid alone: leapfrog, stable below a longest step; or trapezoidal, at any step"
+        default="explicit",
+        description="grid alone: leapfrog, stable below a longest step; or trapezoidal, stable at any step",
     )
     step: Positive | None = Field(
         default=None,
         description="grid alone: of time [s]; by default 0.9 of the longest explicit one, or a cell over the speed "
-        "of long waves. A frame shows the water at the nearest whole step",
+        "of long waves. The longer an implicit step, the more iterations it takes: one of more than 32768, some 2000 "
+        "explicit steps long, is refused as too much work. A frame shows the water at the nearest whole step",
     )
     damping: NonNegative = Field(default=0.0, description="grid alone: rate at which velocities die away [1/s]")
     obstacles: tuple[Obstacle, ...] = Field(default=(), description="grid alone: walls in the water")
@@ -118,4 +129,8 @@ class Simulation(Model):
     @property
     def height_bound(self) -> float:
         """Largest displacement that is planned for [m]."""
-        return self.max_height or float(sum(abs(drop.amplitude) for drop in self.drops))
+        if self.max_height is not None:
+            return self.max_height
+        from warp_caustics.simulation.drops import highest_drops  # which loads Warp, as a scene alone does not
+
+        return highest_drops(self)

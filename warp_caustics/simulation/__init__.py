@@ -3,12 +3,13 @@
 from .basin import Basin, make_basin
 from .drawing import simulated_heights, simulated_surface
 from .passes import SimulationPass, frame_launches, simulation_buffers, simulation_passes, step_launches
-from .water import SimulatedWater
+from .water import SimulatedWater, bound_notes
 
 __all__ = [
     "Basin",
     "SimulatedWater",
     "SimulationPass",
+    "bound_notes",
     "frame_launches",
     "make_basin",
     "simulated_heights",

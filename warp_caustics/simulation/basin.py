@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,8 @@ import numpy as np
 from ..errors import InputError
 from ..kernels.fft import LONGEST, SHORTEST
 from ..water import GRAVITY
+from .chebyshev import MOST_ITERATIONS, chebyshev_count, stiffest_solved
+from .drops import WIDEST_DROP, check_drops, check_open
 
 if TYPE_CHECKING:
     from ..scene import Scene, Simulation
@@ -26,11 +28,14 @@ SAFE_SHARE = 0.9
 WHOLE = 1e-9
 """Share of a cell by which a side may miss a whole number of them and still count as whole: rounding of decimals."""
 
-WIDEST_DROP = 8.0
-"""Radius of a drop at most, in sides of the water: its images, which are added up, would lift the water as one."""
+MOST_WORK = 2**45
+"""Cells in the launches up to a time at most: a core takes 2 ns for each, and so most of a day."""
 
-MOST_STEPS = 10**9
-"""Steps to a time at most: they are counted exactly, and would take days."""
+LAUNCH_WORK = 2**12
+"""Cells that take as long as a launch by itself."""
+
+SHOWN = 1e-5
+"""Share by which a longest value is lowered before it is shown in six digits, so that what is shown will pass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +88,12 @@ class Basin:
         return self.size[0] / self.columns, self.size[1] / self.rows
 
     @property
+    def extent(self) -> str:
+        """Where the water is, in words."""
+        (x, y), (width, height) = self.origin, self.size
+        return f"x {x:g} to {x + width:g} m, y {y:g} to {y + height:g} m"
+
+    @property
     def tension(self) -> float:
         """Surface tension by density [m^3/s^2]."""
         return self.settings.surface_tension / self.settings.density
@@ -93,8 +104,30 @@ class Basin:
         laplacian = sum(4.0 / side**2 for side in self.cell)
         return GRAVITY * self.depth * laplacian + self.tension * self.depth * laplacian**2
 
-    def steps_to(self, time: float) -> int:
-        """Whole steps nearest to a time.
+    @property
+    def step_launches(self) -> int:
+        """Launches of a step, 0 where no steps are taken."""
+        if self.spectral:
+            return 0
+        return 2 if self.explicit else 2 + 2 * implicit_iterations(self)
+
+    def centres(self) -> tuple[np.ndarray, np.ndarray]:
+        """World coordinates x ``[columns]`` and y ``[rows]`` of the middles of the cells [m]."""
+        x = self.origin[0] + (np.arange(self.columns) + 0.5) * self.cell[0]
+        y = self.origin[1] + (np.arange(self.rows) + 0.5) * self.cell[1]
+        return x, y
+
+    def away(self, position: tuple[float, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Way from a point, or its nearest image, to the middles of the cells: x ``[1, columns]``, y ``[rows, 1]``."""
+        x, y = self.centres()
+        along, across = x[None, :] - position[0], y[:, None] - position[1]
+        if self.periodic:
+            along -= self.size[0] * np.round(along / self.size[0])
+            across -= self.size[1] * np.round(across / self.size[1])
+        return along, across
+
+    def steps_to(self, time: float, where: str = "time") -> int:
+        """Whole steps nearest to a time, which is told as ``where`` if it is refused.
 
         Raises
         ------
@@ -102,11 +135,13 @@ class Basin:
             If the time is before the first, or too many steps away.
         """
         if time < 0.0:
-            raise InputError(f'time: water.simulation of kind "grid" runs from 0 s, got {time:g} s')
-        if time / self.step > MOST_STEPS:
+            raise InputError(f'{where}: water.simulation of kind "grid" runs from 0 s, got {time:g} s')
+        most = MOST_WORK / (self.step_launches * (self.rows * self.columns + LAUNCH_WORK))
+        if time / self.step > most:
             raise InputError(
-                f"time: {time:g} s are {time / self.step:.3g} steps of {self.step:g} s of water.simulation, and "
-                f"{MOST_STEPS:,} are what can be gone through; expected an earlier time or a longer step"
+                f"{where}: {time:g} s are {time / self.step:.3g} steps of {self.step:g} s of water.simulation, which "
+                f"on {self.columns} x {self.rows} cells would take about a day or longer; expected "
+                f"{(1.0 - SHOWN) * most * self.step:.6g} s at most, or a longer water.simulation.step, or larger cells"
             )
         return round(time / self.step)
 
@@ -126,8 +161,9 @@ def make_basin(scene: Scene, rest_depth: float, low: np.ndarray, high: np.ndarra
     Raises
     ------
     InputError
-        If its cells are too few, too many, or no powers of two where they must be; if a step is unstable; if a drop
-        is not resolved or beside the water; or if obstacles leave none of it.
+        If its cells are too few, too many, too long, or no powers of two where they must be; if a step is unstable or
+        takes too many iterations; if a drop is not resolved, beside the water, in an obstacle, or falls too late; or if
+        an obstacle covers no cell, or all together cover all of them.
     """
     settings = scene.water.simulation
     assert settings is not None
@@ -137,17 +173,21 @@ def make_basin(scene: Scene, rest_depth: float, low: np.ndarray, high: np.ndarra
         origin, size = (float(low[0]), float(low[1])), (float(high[0] - low[0]), float(high[1] - low[1]))
     columns, rows = _cells(settings, size)
     plain = Basin(settings, origin, size, rows, columns, settings.depth or rest_depth)
-    _check_drops(plain)
+    _check_shape(plain)
+    check_drops(plain)
     if plain.spectral:
         return plain
-    return Basin(settings, origin, size, rows, columns, plain.depth, _step(plain), _solid(plain))
+    basin = replace(plain, step=_step(plain), solid=_solid(plain))
+    for number, drop in enumerate(settings.drops):
+        basin.steps_to(drop.time, f"water.simulation.drops[{number}].time")
+        check_open(basin, number)
+    return basin
 
 
-def cell_centres(basin: Basin) -> tuple[np.ndarray, np.ndarray]:
-    """World coordinates x ``[columns]`` and y ``[rows]`` of the middles of the cells [m]."""
-    x = basin.origin[0] + (np.arange(basin.columns) + 0.5) * basin.cell[0]
-    y = basin.origin[1] + (np.arange(basin.rows) + 0.5) * basin.cell[1]
-    return x, y
+def implicit_iterations(basin: Basin) -> int:
+    """Chebyshev iterations of an implicit step."""
+    drag = 0.5 * basin.settings.damping * basin.step
+    return chebyshev_count(0.25 * basin.step**2 / (1.0 + drag) * basin.stiffest)
 
 
 def _cells(settings: Simulation, size: tuple[float, float]) -> tuple[int, int]:
@@ -177,7 +217,7 @@ def _step(basin: Basin) -> float:
     settings = basin.settings
     longest = 2.0 / float(np.sqrt(basin.stiffest))
     if not basin.explicit:
-        return settings.step or min(basin.cell) / float(np.sqrt(GRAVITY * basin.depth))
+        return _implicit_step(basin)
     if settings.step is not None and settings.step >= longest:
         raise InputError(
             f"water.simulation.step: expected less than {longest:.6g} s, beyond which the explicit integrator is "
@@ -187,41 +227,56 @@ def _step(basin: Basin) -> float:
     return settings.step or SAFE_SHARE * longest
 
 
-def _check_drops(basin: Basin) -> None:
-    """Refuse drops that the cells do not resolve, or that fall beside the water."""
-    low, high = np.asarray(basin.origin), np.add(basin.origin, basin.size)
-    for number, drop in enumerate(basin.settings.drops):
-        where = f"water.simulation.drops[{number}]"
-        least, most = max(basin.cell), WIDEST_DROP * min(basin.size)
-        if not least <= drop.radius <= most:
-            raise InputError(
-                f"{where}.radius: expected {least:g} m, a cell's side, to {most:g} m, {WIDEST_DROP:g} times the "
-                f"water's, got {drop.radius:g} m"
-            )
-        if not basin.periodic and not ((low <= drop.position) & (drop.position <= high)).all():
-            raise InputError(
-                f"{where}.position: expected a point of the water, x {low[0]:g} to {high[0]:g} m, "
-                f"y {low[1]:g} to {high[1]:g} m, got {list(drop.position)}"
-            )
+def _implicit_step(basin: Basin) -> float:
+    """Step of time: the one given, if it can be solved, or the default."""
+    given = basin.settings.step
+    step = given or min(basin.cell) / float(np.sqrt(GRAVITY * basin.depth))
+    count = implicit_iterations(replace(basin, step=step))
+    if count <= MOST_ITERATIONS:
+        return step
+    # Of step^2 / 4 / (1 + damping step / 2) = square.
+    square = stiffest_solved() / basin.stiffest
+    dragged = square * basin.settings.damping
+    longest = (1.0 - SHOWN) * float(dragged + np.sqrt(dragged**2 + 4.0 * square))
+    if given is None:
+        return longest
+    raise InputError(
+        f"water.simulation.step: {given:g} s take {count:.3g} iterations a step for cells of {basin.cell[0]:g} x "
+        f"{basin.cell[1]:g} m and {basin.depth:g} m of water, and {MOST_ITERATIONS:,} are what is gone through; "
+        f"expected {longest:.6g} s at most, or larger cells"
+    )
+
+
+def _check_shape(basin: Basin) -> None:
+    """Refuse cells so much longer than the water is wide that it could hold no drop."""
+    if max(basin.cell) > WIDEST_DROP * min(basin.size):
+        counted = "resolution" if basin.settings.cell is None else "cell"
+        key = counted if basin.settings.size is None else "size"
+        raise InputError(
+            f"water.simulation.{key}: expected sides that are cut into cells of about one length, got cells of "
+            f"{basin.cell[0]:g} x {basin.cell[1]:g} m in {basin.size[0]:g} x {basin.size[1]:g} m of water"
+        )
 
 
 def _solid(basin: Basin) -> np.ndarray | None:
     """Cells whose middle lies in an obstacle."""
     if not basin.settings.obstacles:
         return None
-    x, y = cell_centres(basin)
     solid = np.zeros((basin.rows, basin.columns), dtype=np.uint8)
-    for obstacle in basin.settings.obstacles:
-        away = [x[None, :] - obstacle.position[0], y[:, None] - obstacle.position[1]]
-        if basin.periodic:
-            away = [d - side * np.round(d / side) for d, side in zip(away, basin.size, strict=True)]
+    for number, obstacle in enumerate(basin.settings.obstacles):
+        away = basin.away(obstacle.position)
         if obstacle.radius is not None:
             inside = np.hypot(*away) <= obstacle.radius
         else:
             assert obstacle.size is not None
             half = 0.5 * np.asarray(obstacle.size)
             inside = (np.abs(away[0]) <= half[0]) & (np.abs(away[1]) <= half[1])
+        if not inside.any():
+            raise InputError(
+                f"water.simulation.obstacles[{number}]: it covers the middle of no cell; expected one that stands in "
+                f"the water, {basin.extent}, and is wider than a cell, {basin.cell[0]:g} x {basin.cell[1]:g} m"
+            )
         solid[inside] = 1
     if solid.all():
         raise InputError("water.simulation.obstacles: expected some open water, and they cover all of it")
-    return solid if solid.any() else None
+    return solid

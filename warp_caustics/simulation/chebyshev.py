@@ -12,10 +12,17 @@ mode's frequency by a share of ``r theta^2`` and gives or takes no energy.
 
 from __future__ import annotations
 
+import functools
 import math
 
 SOLVER_TOLERANCE = 1e-9
 """Relative error of a mode's mean height in a step at most, of the stiffest mode."""
+
+MOST_ITERATIONS = 2**15
+"""Iterations of an implicit step at most: it is then some 2000 explicit steps long, and costs as much as 30 000."""
+
+HALVINGS = 100
+"""Bisections of the logarithm of a stiffness: past float64's resolution."""
 
 
 def chebyshev_count(stiffness: float) -> int:
@@ -23,8 +30,23 @@ def chebyshev_count(stiffness: float) -> int:
     if stiffness == 0.0:
         return 1
     reduction = max(stiffness, 1.0) / SOLVER_TOLERANCE
-    centre = (2.0 + stiffness) / stiffness  # of the eigenvalues, in units of their half width
-    return max(1, math.ceil(math.acosh(reduction) / math.acosh(centre)))
+    # The eigenvalues' centre, in units of their half width, is past 1 by this; 1 + past would lose it in stiff steps.
+    past = 2.0 / stiffness
+    return max(1, math.ceil(math.acosh(reduction) / math.log1p(past + math.sqrt(past * (past + 2.0)))))
+
+
+@functools.cache
+def stiffest_solved() -> float:
+    """Stiffness that the iterations at most can solve."""
+    # A stiffness takes about as many iterations as its square root, so that one of their fourth power takes too many.
+    solved, beyond = 0.0, 4.0 * math.log(MOST_ITERATIONS)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (solved + beyond)
+        if chebyshev_count(math.exp(middle)) <= MOST_ITERATIONS:
+            solved = middle
+        else:
+            beyond = middle
+    return math.exp(solved)
 
 
 def chebyshev_coefficients(stiffness: float, count: int) -> list[tuple[float, float]]:

@@ -18,7 +18,8 @@ from ..kernels.height_field import (
     make_surface,
 )
 from ..water import GRAVITY
-from .chebyshev import chebyshev_coefficients, chebyshev_count
+from .basin import implicit_iterations
+from .chebyshev import chebyshev_coefficients
 from .drops import drop_profiles
 
 if TYPE_CHECKING:
@@ -53,6 +54,8 @@ class GridWater:
         for number, drop in enumerate(basin.settings.drops):
             self._falling.setdefault(basin.steps_to(drop.time), []).append(number)
         self._steps: int | None = None
+        # All that a launch reads before it is written; 0 times a NaN that stayed would be one.
+        self._kept: list[wp.array] = [self.height, self.velocity]
         self._record()
 
     def advance(self, time: float) -> None:
@@ -64,20 +67,22 @@ class GridWater:
             As :meth:`Basin.steps_to`.
         """
         steps = self._basin.steps_to(time)
-        if self._steps is None or self._steps > steps:
-            self.height.zero_()
-            self.velocity.zero_()
-            self._steps = 0
-            self._drop()
-        while self._steps < steps:
+        # Between the launches of a step the state is of no time: after an interruption it starts again.
+        done, self._steps = self._steps, None
+        if done is None or done > steps:
+            for array in self._kept:
+                array.zero_()
+            done = 0
+            self._drop(done)
+        while done < steps:
             self._step()
-            self._steps += 1
-            self._drop()
+            done += 1
+            self._drop(done)
         self._surface.launch()
+        self._steps = done
 
-    def _drop(self) -> None:
-        assert self._steps is not None
-        for number in self._falling.get(self._steps, ()):
+    def _drop(self, steps: int) -> None:
+        for number in self._falling.get(steps, ()):
             self._drops.set_param_by_name("number", number)
             self._drops.launch()
 
@@ -111,9 +116,9 @@ class GridWater:
             self._step = self._solve_step
             stiffness = 0.25 * step**2 / (1.0 + drag)
             ahead = 0.5 * step / (1.0 + drag)
-            worst = stiffness * basin.stiffest
-            self._coefficients = chebyshev_coefficients(worst, chebyshev_count(worst))
+            self._coefficients = chebyshev_coefficients(stiffness * basin.stiffest, implicit_iterations(basin))
             self._mean, self._change = (wp.zeros_like(self.height) for _ in range(2))
+            self._kept.append(self._change)
             self._begin = self._bind(begin_solve, height=self.height, velocity=self.velocity, ahead=ahead,
                                      mean=self._mean)  # fmt: skip
             self._push = self._bind(pressure, height=self._mean, pressure=self._pressure)

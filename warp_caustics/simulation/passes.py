@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ..program import Buffer
-from .chebyshev import chebyshev_count
+from .basin import implicit_iterations
 from .spectral import padded_shape
 
 if TYPE_CHECKING:
@@ -56,12 +56,6 @@ def simulation_passes(basin: Basin) -> tuple[SimulationPass, ...]:
     return (*drops, *steps, surface, *closing)
 
 
-def implicit_iterations(basin: Basin) -> int:
-    """Chebyshev iterations of an implicit step."""
-    drag = 0.5 * basin.settings.damping * basin.step
-    return chebyshev_count(0.25 * basin.step**2 / (1.0 + drag) * basin.stiffest)
-
-
 def frame_launches(basin: Basin) -> int:
     """Launches of every frame, steps and drops apart."""
     return sum(one.launches for one in simulation_passes(basin) if one.each == "frame")
@@ -72,10 +66,17 @@ def step_launches(basin: Basin) -> int:
     return sum(one.launches for one in simulation_passes(basin) if one.each == "step")
 
 
+def node_ring(basin: Basin) -> int:
+    """Nodes beyond the border of the water, to each side: one past a wall, none where the water repeats."""
+    return 0 if basin.periodic else 1
+
+
 def simulation_buffers(basin: Basin) -> tuple[Buffer, ...]:
     """Say what is allocated."""
     cells, drops = (basin.rows, basin.columns), len(basin.settings.drops)
-    buffers = [Buffer("water_nodes", "vec4", cells, 16), Buffer("water_surface", "float64", cells, 8),
+    ring = 2 * node_ring(basin)
+    buffers = [Buffer("water_nodes", "vec4", (basin.rows + ring, basin.columns + ring), 16),
+               Buffer("water_surface", "float64", cells, 8),
                Buffer("water_extremes", "float32", (2,), 4)]  # fmt: skip
     if basin.spectral:
         rows, columns = padded_shape(basin)

@@ -8,6 +8,7 @@ import warp as wp
 
 from ..kernels.nodes import EXTREMES, make_extremes, make_nodes
 from .grid import GridWater
+from .passes import node_ring
 from .spectral import SpectralWater
 
 if TYPE_CHECKING:
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 
 KINDS: dict[str, Any] = {"spectral": SpectralWater, "grid": GridWater}
 """By ``water.simulation.kind``."""
+
+
+ROUNDING = 1.0 + 1e-6
+"""Times a bound that float32 may pass."""
 
 
 class SimulatedWater:
@@ -27,13 +32,18 @@ class SimulatedWater:
     motion : SpectralWater or GridWater
         What moves the water, and owns its state.
     nodes : wp.array
-        vec4 ``[rows, columns]``, as :func:`~warp_caustics.height_map.hermite_nodes`, written by :meth:`advance`.
+        vec4 ``[rows, columns]``, as :func:`~warp_caustics.height_map.hermite_nodes`, written by :meth:`advance`;
+        between walls with a ring of nodes beyond them.
+    ring : int
+        How many.
     """
 
     def __init__(self, basin: Basin, device: str) -> None:
         self.basin = basin
         self.motion = KINDS[basin.settings.kind](basin, device)
-        self.nodes = wp.zeros((basin.rows, basin.columns), dtype=wp.vec4, device=device)
+        self.ring = node_ring(basin)
+        shape = (basin.rows + 2 * self.ring, basin.columns + 2 * self.ring)
+        self.nodes = wp.zeros(shape, dtype=wp.vec4, device=device)
         self._extremes = wp.zeros(len(EXTREMES), dtype=wp.float32, device=device)
         per_metre = wp.vec2(1.0 / basin.cell[0], 1.0 / basin.cell[1])
         self._launches = [
@@ -57,14 +67,19 @@ class SimulatedWater:
         for launch in self._launches:
             launch.launch()
 
-    def warnings(self) -> list[str]:
+    def warnings(self) -> tuple[str, ...]:
         """Read back what the water of the last time passed of its declared bounds, and say so."""
-        settings, notes = self.basin.settings, []
-        declared = {"slope": settings.max_slope, "height": settings.height_bound}
-        for name, largest in zip(EXTREMES, self._extremes.numpy(), strict=True):
-            if largest > declared[name]:
-                notes.append(
-                    f"water.simulation: its surface reaches a {name} of {largest:.3g}, and {declared[name]:.3g} is "
-                    f"planned for; light may be missing at the map's border: raise max_{name}"
-                )
-        return notes
+        slope, height = self._extremes.numpy()
+        return bound_notes(self.basin, float(slope), float(height))
+
+
+def bound_notes(basin: Basin, slope: float, height: float) -> tuple[str, ...]:
+    """Say which declared bounds a surface of this steepest slope and largest height [m] passes."""
+    settings = basin.settings
+    declared = (("slope", slope, settings.max_slope), ("height", height, settings.height_bound))
+    return tuple(
+        f"water.simulation: its surface reaches a {name} of {largest:.3g}, and {bound:.3g} is planned for; light may "
+        f"be missing at the map's border, and is dropped where the surface faces away from the sun: raise max_{name}"
+        for name, largest, bound in declared
+        if largest > bound * ROUNDING
+    )
