@@ -47,6 +47,7 @@ def scene(
     self_shadow: str | bool = "auto",
     sun: dict[str, Any] | None = None,
     method: dict[str, Any] | None = None,
+    camera: dict[str, Any] | None = None,
 ) -> wc.Scene:
     """Make a scene of one metre of water over a flat floor at z = 0, with pixels that are not square."""
     kinds: dict[str, Any] = {"height_map": height_map, "simulation": simulation}
@@ -58,6 +59,7 @@ def scene(
         medium={"ior": IOR} if medium is None else medium,
         map={"origin": origin, "size": size, "resolution": resolution},
         method=method or {},
+        camera=camera,
     )
 
 

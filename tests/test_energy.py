@@ -251,7 +251,7 @@ def test_everything_at_once_adds_up(device, method, tmp_path):
         resolution=(48, 30),
     )
     result = render(what, method, device)
-    left_out = {reason.what for reason in result.plan.facts.reasons if not reason.kept}
+    left_out = {reason.what for reason in result.plan.reasons if not reason.kept}
     assert left_out == {"camera", "simulation"}  # a file has no simulation
     assert_adds_up(result)
     assert np.isfinite(result.caustic_map).all()

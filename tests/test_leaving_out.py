@@ -78,7 +78,7 @@ def test_a_camera_adds_nothing_to_a_method_that_does_not_look(device, method):
     bare = scene(GENTLE)
     plans = [wc.make_plan(what, method, "cpu", 1) for what in (bare, with_eye(bare))]
     assert footprint(plans[0]) == footprint(plans[1])
-    (reason,) = (reason for reason in plans[1].facts.reasons if reason.what == "camera")
+    (reason,) = (reason for reason in plans[1].reasons if reason.what == "camera")
     assert not reason.kept
     assert "does not look" in reason.why
     np.testing.assert_array_equal(

@@ -55,10 +55,10 @@ def test_each_thread_adds_to_a_map_of_its_own(method):
     # Sums on a CPU are plain additions: two threads on one map would now and then lose light, and no test would see it.
     renderer = wc.Renderer(tall(), method, "cpu", 2)
     renderer.render(0.4)
-    lanes = renderer._maps.numpy()
+    lanes = renderer._recording.maps.numpy()
     assert lanes.shape[0] == 2
     assert (lanes.sum(axis=1) > 0.1 * lanes.sum()).all()
-    ledgers = renderer._ledgers.numpy()
+    ledgers = renderer._recording.ledgers.numpy()
     assert (ledgers[:, 0].sum(axis=1) > 0.1 * ledgers[:, 0].sum()).all()
 
 

@@ -47,10 +47,10 @@ def write_map(
     version: str,
     method: str,
     units: str,
-    origin: Sequence[float],
-    size: Sequence[float],
     energy: Mapping[str, Any],
     time: float,
+    origin: Sequence[float] | None = None,
+    size: Sequence[float] | None = None,
 ) -> None:
     """Write a map as EXR, whole or not at all; `load_map` gives it back bit for bit.
 
@@ -68,12 +68,12 @@ def write_map(
         Version of this library, and name of the method that made the map.
     units
         Units of the values, such as "W/m²".
-    origin, size
-        Lower corner and extent of the map, (x, y) [m].
     energy
         The ledger [W]: name to number, or to one number for each channel.
     time
         Time of the frame [s].
+    origin, size
+        Lower corner and extent of the map, (x, y) [m]; left out of what a camera sees.
 
     Raises
     ------
@@ -89,8 +89,8 @@ def write_map(
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
         "rowOrder": ROW_ORDER,
-        "origin": _as_attribute(origin),
-        "size": _as_attribute(size),
+        **({} if origin is None else {"origin": _as_attribute(origin)}),
+        **({} if size is None else {"size": _as_attribute(size)}),
         "units": units,
         "scene": scene_text,
         "software": f"{SOFTWARE} {version}",

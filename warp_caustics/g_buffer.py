@@ -112,13 +112,18 @@ def set_view(scratch: Scratch, projection: Projection) -> None:
             f"the view has {columns} x {rows} pixels, the buffers {scratch.visibility.shape[1]} x "
             f"{scratch.visibility.shape[0]}"
         )
+    scratch.view.assign([device_view(projection)])
+
+
+def device_view(projection: Projection) -> DeviceView:
+    """Make the kernels' form of a projection."""
     view = DeviceView()
     view.matrix = wp.mat33d(*projection.matrix.ravel())
     view.offset = wp.vec3d(*projection.offset)
     view.inverse = wp.mat33d(*np.linalg.inv(projection.matrix).ravel())
     view.w_of_depth, view.w_constant = (1.0, 0.0) if projection.perspective else (0.0, 1.0)
     view.near = projection.near if math.isfinite(projection.near) else _NO_NEAR
-    scratch.view.assign([view])
+    return view
 
 
 def rasterize_into(g_buffer: GBuffer, triangles: Triangles, scratch: Scratch, normals: Normals = "face") -> None:
@@ -180,7 +185,7 @@ def _fill(triangles: Triangles, scratch: Scratch) -> None:
         outputs=[scratch.visibility, scratch.large, scratch.ends, scratch.tally, scratch.dropped_counts],
         device=device,
     )
-    workers = LARGE_WORKERS_CUDA if device.is_cuda else LARGE_WORKERS_CPU
+    workers = large_workers(str(device))
     wp.launch(
         fill_large_kernel,
         dim=workers,
@@ -196,6 +201,11 @@ def _fill(triangles: Triangles, scratch: Scratch) -> None:
         outputs=[scratch.visibility],
         device=device,
     )
+
+
+def large_workers(device: str) -> int:
+    """Count the threads that share the blocks of large triangles on a device."""
+    return LARGE_WORKERS_CPU if device == "cpu" else LARGE_WORKERS_CUDA
 
 
 def rasterize(

@@ -12,15 +12,18 @@ from .kernels.ledger import ENTRIES
 if TYPE_CHECKING:
     from .facts import Facts
     from .plan import Plan
+    from .program import Program
 
 
-def read_energy(plan: Plan, ledgers: np.ndarray, caustic_map: np.ndarray, dry: np.ndarray) -> Energy:
+def read_energy(plan: Plan, program: Program, ledgers: np.ndarray, caustic_map: np.ndarray, dry: np.ndarray) -> Energy:
     """Add up a frame's ledger.
 
     Parameters
     ----------
     plan : Plan
         The renderer's plan.
+    program : Program
+        Its program.
     ledgers : ndarray
         ``[lanes, entries * channels, bins]``, in fluxes of a cell at unit irradiance.
     caustic_map : ndarray
@@ -33,7 +36,7 @@ def read_energy(plan: Plan, ledgers: np.ndarray, caustic_map: np.ndarray, dry: n
     Energy
         [W].
     """
-    facts, lattice = plan.facts, plan.program.lattice
+    facts, lattice = plan.facts, program.lattice
     colours = len(facts.irradiance)
     pixel_area = float(np.prod(facts.pixel))
     cell = lattice.step**2 * pixel_area * facts.sun_share * np.asarray(facts.irradiance)

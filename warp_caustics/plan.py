@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .assets import load_assets
 from .errors import InputError
 from .facts import Facts, gather_facts
-from .kernels.deposit import ACCUMULATOR
-from .kernels.ledger import BINS, ENTRIES
 from .magnitude import check_asset_magnitudes, check_magnitudes
 from .methods import METHODS
 from .program import MOST_WORK, Buffer, Program
 from .scene import Scene, known_method, load_scene
+from .sequence import Sequence
 from .simulation import SimulationPass, frame_launches, simulation_buffers, simulation_passes, step_launches
+from .specify import Reason
 from .window import TOO_FAR
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from .reference.plan import ReferencePlan
 
@@ -48,7 +48,7 @@ class Plan:
         Lanes that strips are spread over; 1 on a GPU.
     facts : Facts
         What follows from the scene.
-    program : Program
+    program : Program or Sequence
         What the method does.
     buffers : tuple of Buffer
         Everything that is allocated.
@@ -58,7 +58,7 @@ class Plan:
     device: str
     threads: int
     facts: Facts
-    program: Program
+    program: Program | Sequence
     buffers: tuple[Buffer, ...]
 
     @property
@@ -67,11 +67,20 @@ class Plan:
         return sum(self.copies(buffer) * buffer.bytes for buffer in self.buffers)
 
     @property
+    def settings(self) -> Mapping[str, Any]:
+        """The method's parameters as chosen."""
+        return self.program.settings
+
+    @property
+    def samples(self) -> int:
+        """Cells or photons of a frame, all directions of the sun together."""
+        return self.program.work(self.facts)
+
+    @property
     def launches(self) -> int:
         """Kernel launches in a frame, a simulation's steps and drops apart."""
-        jobs = self.program.strips * len(self.facts.suns)
         water = 0 if self.facts.basin is None else frame_launches(self.facts.basin)
-        return water + jobs * len(self.program.passes) + 1 + int(self.facts.spec.shore)
+        return water + self.program.launches(self.facts)
 
     @property
     def water_passes(self) -> tuple[SimulationPass, ...]:
@@ -81,14 +90,20 @@ class Plan:
     @property
     def kernels(self) -> tuple[str, ...]:
         """Names of the kernels that are compiled."""
-        dry = ("dry_land",) if self.facts.spec.shore else ()
-        water = (step.name for step in self.water_passes)
-        return (*water, *(step.name for step in self.program.passes), "resolve", *dry)
+        return (*(step.name for step in self.water_passes), *self.program.kernels(self.facts))
+
+    @property
+    def reasons(self) -> tuple[Reason, ...]:
+        """What is kept and left out, and why."""
+        looks, scene = self.program.looks, self.facts.scene
+        why_not = "this method does not look" if scene.camera else "no camera"
+        camera = Reason("camera", looks, "this method looks through it" if looks else why_not)
+        return (*(self.facts.reasons if self.program.reasons is None else self.program.reasons), camera)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a user should know before trusting the map."""
-        work = self.program.lattice.cells * len(self.facts.suns)
+        work = self.samples
         long = (f"map: a frame takes {work:,} cells of water, which is minutes; {TOO_FAR}",) if work > LONG_WORK else ()
         return (*self.facts.warnings, *long)
 
@@ -101,26 +116,19 @@ class Plan:
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        scene, program, lattice = self.facts.scene, self.program, self.program.lattice
+        program = self.program
         settings = ", ".join(f"{name} = {value}" for name, value in program.settings.items())
-        yield f"{scene.name}: method {self.method} ({settings}) on {self.device}, {self.threads} thread(s)"
-        yield (
-            f"  map {scene.map.resolution[0]} x {scene.map.resolution[1]} pixels, "
-            f"water {lattice.count[0]} x {lattice.count[1]} cells, {len(self.facts.suns)} sun direction(s)"
-        )
+        yield f"{self.facts.scene.name}: method {self.method} ({settings}) on {self.device}, {self.threads} thread(s)"
+        yield f"  {program.size(self.facts)}"
         yield "passes"
         for one in self.water_passes:
             often = "launch(es)" if one.each == "frame" else f"a {one.each}"
             yield f"  {one.name:<16}{one.launches:>6} {often:<12}{one.does}"
-        jobs = program.strips * len(self.facts.suns)
-        for step in program.passes:
-            yield f"  {step.name:<16}{jobs:>6} launch(es)  {step.does}"
-        yield f"  {'resolve':<16}{1:>6} launch(es)  lanes added up and scaled to irradiance"
-        if self.facts.spec.shore:
-            yield f"  {'dry_land':<16}{1:>6} launch(es)  direct sunlight on dry land"
+        for name, count, does in program.pass_lines(self.facts):
+            yield f"  {name:<16}{count:>6} launch(es)  {does}"
         for kept in (True, False):
             yield "kept" if kept else "left out"
-            for reason in self.facts.reasons:
+            for reason in self.reasons:
                 if reason.kept == kept:
                     yield f"  {reason.what:<28}{reason.why}"
         yield "buffers"
@@ -184,7 +192,7 @@ def make_plan(
         return plan_reference(facts, device, resolve_threads(threads, device), free_memory(device))
     program = METHODS[name](facts)
     check_work(facts, program)
-    lanes = min(resolve_threads(threads, device), program.strips * len(facts.suns)) if program.banded else 1
+    lanes = min(resolve_threads(threads, device), program.lanes(facts))
     plan = Plan(name, device, lanes, facts, program, _buffers(facts, program))
     free = free_memory(device)
     if plan.bytes > SPARE_MEMORY * free and threads is None:
@@ -235,7 +243,7 @@ def check_map_fits(scene: Scene, device: str, free: int) -> None:
         )
 
 
-def check_work(facts: Facts, program: Program) -> None:
+def check_work(facts: Facts, program: Program | Sequence) -> None:
     """Refuse a frame that would take days.
 
     Raises
@@ -243,29 +251,16 @@ def check_work(facts: Facts, program: Program) -> None:
     InputError
         With the cells that it takes.
     """
-    work = program.lattice.cells * len(facts.suns)
+    work, suns = program.work(facts), len(facts.suns)
     if work > MOST_WORK:
         raise InputError(
-            f"map: a frame takes {program.lattice.cells:,} cells of water for each of {len(facts.suns)} sun "
-            f"direction(s), and {MOST_WORK:,} in all are what can be gone through; {TOO_FAR}"
+            f"map: a frame takes {work // suns:,} cells of water for each of {suns} sun direction(s), and "
+            f"{MOST_WORK:,} in all are what can be gone through; {TOO_FAR}"
         )
 
 
-def _buffers(facts: Facts, program: Program) -> tuple[Buffer, ...]:
-    import warp as wp
-
-    columns, rows = facts.scene.map.resolution
-    colours = len(facts.irradiance)
-    element = wp.types.type_size_in_bytes(ACCUMULATOR[program.accumulate])
-    values = columns * rows * facts.spec.channels
-    ledger = (len(ENTRIES) * facts.spec.channels, BINS)
-    buffers = [
-        Buffer("caustic_map", "float32", (columns * rows * colours,), 4),
-        Buffer("map", program.accumulate, (values,), element, per_lane=True),
-        Buffer("ledger", "float64", ledger, 8, per_lane=True),
-        *program.buffers,
-        Buffer("suns", "SunSample", (len(facts.suns),), SUN_BYTES),
-    ]
+def _buffers(facts: Facts, program: Program | Sequence) -> tuple[Buffer, ...]:
+    buffers = [*program.own_buffers(facts), Buffer("suns", "SunSample", (len(facts.suns),), SUN_BYTES)]
     if facts.scene.water.waves:
         buffers.append(Buffer("waves", "Wave", (len(facts.scene.water.waves),), WAVE_BYTES))
     for name, grid in (("water_nodes", facts.assets.water), ("terrain_nodes", facts.assets.terrain)):
@@ -277,6 +272,4 @@ def _buffers(facts: Facts, program: Program) -> tuple[Buffer, ...]:
         if mesh is not None:
             # Vertices and indices; the BVH is Warp's own and comes on top.
             buffers.append(Buffer(name, "Mesh", (mesh.vertices.size + mesh.triangles.size,), 4))
-    if facts.spec.shore:
-        buffers.append(Buffer("dry", "float64", (3,), 8))
     return tuple(buffers)

@@ -18,6 +18,7 @@ from warp_caustics.tone import RGB, from_scale, is_colour, to_rgb8, to_scale, va
 
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw, ImageFont
+    from PIL.PngImagePlugin import PngInfo
 
 SMALLEST_SIDE = 512
 """The longer side of a map has at least so many pixels in the picture: a smaller map is enlarged by a whole factor."""
@@ -89,16 +90,41 @@ def write_png(
     RenderError
         Writing failed although it had begun: the disk is full, for example.
     """
+    picture = draw_map(image, origin=origin, size=size, units=units, title=title, limits=limits)
+    known = {"Software": "warp-caustics", "Title": title or "", "Units": units}
+    with whole_file(path) as temporary:
+        picture.save(temporary, format="PNG", pnginfo=_texts({**known, **(metadata or {})}))
+
+
+def write_picture(
+    path: str | os.PathLike[str], pixels: npt.NDArray[np.uint8], metadata: Mapping[str, str] | None = None
+) -> None:
+    """Write a picture with nothing beside its pixels, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        The PNG file to write, in a folder that exists.
+    pixels
+        uint8 sRGB [rows, columns, 3], row 0 at the bottom.
+    metadata
+        Texts to keep in the file, by name.
+    """
+    from PIL import Image
+
+    picture = Image.fromarray(np.ascontiguousarray(pixels[::-1]))
+    with whole_file(path) as temporary:
+        picture.save(temporary, format="PNG", pnginfo=_texts({"Software": "warp-caustics", **(metadata or {})}))
+
+
+def _texts(texts: Mapping[str, str]) -> PngInfo:
     from PIL.PngImagePlugin import PngInfo
 
-    picture = draw_map(image, origin=origin, size=size, units=units, title=title, limits=limits)
-    texts = PngInfo()
-    known = {"Software": "warp-caustics", "Title": title or "", "Units": units}
-    for name, text in {**known, **(metadata or {})}.items():
+    info = PngInfo()
+    for name, text in texts.items():
         if text:
-            texts.add_itxt(name, text)
-    with whole_file(path) as temporary:
-        picture.save(temporary, format="PNG", pnginfo=texts)
+            info.add_itxt(name, text)
+    return info
 
 
 def draw_map(

@@ -7,13 +7,15 @@ a program has are not allocated.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from .kernels.ledger import BINS, ENTRIES
 from .kernels.wave_table import wave_table
 
 if TYPE_CHECKING:
+    from .facts import Facts
     from .kernels.spec import Spec
     from .scene import Scene
     from .window import Lattice
@@ -25,6 +27,9 @@ MOST_WORK = 2**33
 MOST_JOBS = 4096
 """Strips times directions of the sun at most: each is recorded, at 4 KB and a tenth of a millisecond a launch."""
 
+
+ACCUMULATOR_BYTES = {"float32": 4, "float64": 8, "fixed": 8}
+"""Of an element of the map while light is added up."""
 
 CROWD = 2**12
 """Cells for each pixel past which a map is summed in float64 unless the scene says otherwise: float32 rounds as many
@@ -162,3 +167,55 @@ class Program:
     def strips(self) -> int:
         """Strips that cover the lattice."""
         return -(-self.lattice.count[1] // self.strip_rows)
+
+    @property
+    def looks(self) -> bool:
+        """A lattice lights a map in plan view, and asks for no camera."""
+        return False
+
+    @property
+    def reasons(self) -> None:
+        """What is kept and left out follows from the scene alone."""
+        return None
+
+    def launches(self, facts: Facts) -> int:
+        """Kernel launches in a frame."""
+        return sum(count for _, count, _ in self.pass_lines(facts))
+
+    def lanes(self, facts: Facts) -> int:
+        """Threads that can work side by side."""
+        return self.strips * len(facts.suns) if self.banded else 1
+
+    def kernels(self, facts: Facts) -> tuple[str, ...]:
+        """Names of the kernels that are compiled."""
+        return tuple(name for name, _, _ in self.pass_lines(facts))
+
+    def own_buffers(self, facts: Facts) -> tuple[Buffer, ...]:
+        """Buffers of the method, its map and its ledger."""
+        columns, rows = facts.scene.map.resolution
+        channels = facts.spec.channels
+        dry = (Buffer("dry", "float64", (3,), 8),) if facts.spec.shore else ()
+        return (
+            Buffer("caustic_map", "float32", (columns * rows * len(facts.irradiance),), 4),
+            Buffer("map", self.accumulate, (columns * rows * channels,), ACCUMULATOR_BYTES[self.accumulate], True),
+            Buffer("ledger", "float64", (len(ENTRIES) * channels, BINS), 8, per_lane=True),
+            *self.buffers,
+            *dry,
+        )
+
+    def work(self, facts: Facts) -> int:
+        """Cells in a frame, all directions of the sun together."""
+        return self.lattice.cells * len(facts.suns)
+
+    def size(self, facts: Facts) -> str:
+        """Say how much there is to do."""
+        (columns, rows), (across, along) = facts.scene.map.resolution, self.lattice.count
+        return f"map {columns} x {rows} pixels, water {across} x {along} cells, {len(facts.suns)} sun direction(s)"
+
+    def pass_lines(self, facts: Facts) -> Iterator[tuple[str, int, str]]:
+        """Each pass: its name, its launches, what it does."""
+        for step in self.passes:
+            yield step.name, self.strips * len(facts.suns), step.does
+        yield "resolve", 1, "lanes added up and scaled to irradiance"
+        if facts.spec.shore:
+            yield "dry_land", 1, "direct sunlight on dry land"

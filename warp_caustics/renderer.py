@@ -3,38 +3,28 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+import numpy as np
 import warp as wp
 
-from .errors import InputError, RenderError
-from .kernels.deposit import ACCUMULATOR, FLUX, unit
-from .kernels.resolve import make_dry_land, make_resolve
-from .ledger import read_energy
+from .errors import InputError
+from .lattice_recording import LatticeRecording
 from .plan import Plan, make_plan
+from .recording import Command, Recording
 from .result import Result
 from .scene import Scene, load_scene
+from .sequence import Sequence
+from .sequence_recording import SequenceRecording
 from .state import SceneState
 from .water import check_time
 
 if TYPE_CHECKING:
     from .reference.renderer import ReferenceRenderer
-
-DTYPES: Mapping[str, Any] = {"float32": wp.float32, "vec1": FLUX[1], "vec2": wp.vec2, "vec3": FLUX[3],
-                             "uint8": wp.uint8}  # fmt: skip
-"""Elements of a program's buffers."""
-
-OUTPUT = "_out"
-"""Ending of a kernel's parameters that it writes; the buffer's name is what stands before it."""
-
-
-LEFT_OUT = frozenset({"column_waves", "row_waves", "state", "torn_cells"})
-"""Buffers that a kernel names and does not touch where its specification leaves them out. All others must be there:
-Warp would write through the pointer of an array that is not."""
+    from .scene import Camera
 
 
 @dataclass(frozen=True)
@@ -43,13 +33,15 @@ class Frame:
 
     Attributes
     ----------
-    caustic_map : wp.array
-        float32 ``[rows, columns]`` or ``[rows, columns, 3]``, as :attr:`Result.caustic_map`.
+    caustic_map, screen_map : wp.array or None
+        float32 ``[rows, columns]`` or ``[rows, columns, 3]``, as :attr:`Result.caustic_map` and, for methods that look,
+        :attr:`Result.screen_map`; None for what the method does not make.
     time : float
         [s].
     """
 
-    caustic_map: wp.array
+    caustic_map: wp.array | None
+    screen_map: wp.array | None
     time: float
 
 
@@ -87,10 +79,12 @@ class Renderer:
         if not isinstance(plan, Plan):
             raise InputError("method: a reference is converged anew for each frame; use warp_caustics.render(...)")
         self.plan: Plan = plan
-        self._state = SceneState(self.plan.facts, self.plan.device)
-        self._allocate()
+        self._state: SceneState | None = None
+        # Pinned on the host, so that the copy can be part of a captured frame.
+        self._host_clock = wp.zeros(1, dtype=wp.float32, device="cpu", pinned=plan.device != "cpu")
+        self._clock = wp.zeros(1, dtype=wp.float32, device=plan.device)
         start = perf_counter()
-        self._lanes = self._record()
+        self._recording = self._record()
         self.compile_seconds = perf_counter() - start
         self._pool = ThreadPoolExecutor(self.plan.threads) if self.plan.threads > 1 else None
         self._time: float | None = None
@@ -112,16 +106,37 @@ class Renderer:
         """
         check_time(time)
         start = perf_counter()
-        self._state.write(time)
-        if self._pool is None:
-            self._run(0)
-        else:
-            # list() waits for every lane, and passes on what went wrong in one.
-            list(self._pool.map(self._run, range(self.plan.threads)))
-        for launch in self._closing:
-            launch.launch()
+        if self._state is not None:
+            self._state.write(time)
+        self._host_clock.numpy()[0] = time
+        wp.copy(self._clock, self._host_clock)
+        for stage in self._recording.stages:
+            if self._pool is None or len(stage) == 1:
+                for lane in stage:
+                    _run(lane)
+            else:
+                # list() waits for every lane, and passes on what went wrong in one.
+                list(self._pool.map(_run, stage))
         self._time, self._seconds = time, perf_counter() - start
-        return Frame(self._shaped, time)
+        return Frame(self._recording.caustic_map, self._recording.screen_map, time)
+
+    def look_from(self, camera: Camera) -> None:
+        """Move the camera of a method that looks; the next frame is seen from there. Allocates nothing.
+
+        Raises
+        ------
+        InputError
+            If the method does not look, or the camera has another resolution.
+        """
+        if not isinstance(self._recording, SequenceRecording) or not self.plan.program.looks:
+            raise InputError(f'method "{self.plan.method}" does not look through a camera')
+        was = self.plan.facts.scene.camera
+        if was is not None and camera.resolution != was.resolution:
+            raise InputError(
+                f"camera.resolution: expected {list(was.resolution)}, which buffers are made for, got "
+                f"{list(camera.resolution)}"
+            )
+        self._recording.look_from(camera)
 
     def result(self) -> Result:
         """Read back the last frame; render the one at time 0 first if there is none."""
@@ -130,101 +145,42 @@ class Renderer:
         start = perf_counter()
         wp.synchronize_device(self.plan.device)
         waited = perf_counter() - start if self.plan.device != "cpu" else 0.0
-        facts = self.plan.facts
-        caustic_map = self._shaped.numpy().copy()
-        energy = read_energy(self.plan, self._ledgers.numpy(), caustic_map, self._dry.numpy())
+        facts, recording = self.plan.facts, self._recording
+        water = None if self._state is None else self._state.simulated
         return Result(
             scene=facts.scene,
             method=self.plan.method,
             device=self.plan.device,
             time=self._time or 0.0,
             plan=self.plan,
-            caustic_map=caustic_map,
-            energy=energy,
+            caustic_map=_read(recording.caustic_map),
+            energy=recording.energy(),
             seconds=self._seconds + waited,
             assets=facts.assets,
-            notes=() if self._state.simulated is None else self._state.simulated.warnings(),
+            own_screen_map=_read(recording.screen_map),
+            notes=() if water is None else water.warnings(),
         )
 
-    def _allocate(self) -> None:
-        plan, device = self.plan, self.plan.device
-        columns, rows = plan.facts.scene.map.resolution
-        colours = len(plan.facts.irradiance)
-        buffers = {buffer.name: buffer for buffer in plan.buffers}
-        accumulator = ACCUMULATOR[plan.program.accumulate]
-        self._maps = wp.zeros((plan.threads, *buffers["map"].shape), dtype=accumulator, device=device)
-        self._ledgers = wp.zeros((plan.threads, *buffers["ledger"].shape), dtype=wp.float64, device=device)
-        self._caustic_map = wp.zeros(buffers["caustic_map"].shape, dtype=wp.float32, device=device)
-        self._shaped = self._caustic_map.reshape((rows, columns, colours) if colours == 3 else (rows, columns))
-        self._dry = wp.zeros(buffers["dry"].shape if "dry" in buffers else 0, dtype=wp.float64, device=device)
-        self._own = [
-            {
-                buffer.name: wp.empty(buffer.shape, dtype=DTYPES[buffer.dtype], device=device)
-                for buffer in plan.program.buffers
-            }
-            for _ in range(plan.threads)
-        ]
+    def _record(self) -> Recording:
+        program = self.plan.program
+        if isinstance(program, Sequence):
+            return SequenceRecording(self.plan, program, self._scene_state, self._clock)
+        return LatticeRecording(self.plan, program, self._scene_state())
 
-    def _record(self) -> list[list[Any]]:
-        """Build each kernel, and bind every launch of a frame to its arguments, lane by lane."""
-        plan, program = self.plan, self.plan.program
-        lattice = self._state.lattice(program.lattice)
-        common = {"scene": self._state.scene, "suns": self._state.suns, "lattice": lattice, **program.values}
-        kernels = [(step, step.kernel()) for step in program.passes]
-        lanes: list[list[Any]] = [[] for _ in range(plan.threads)]
-        jobs = [(sun, strip) for sun in range(len(plan.facts.suns)) for strip in range(program.strips)]
-        for number, (sun, strip) in enumerate(jobs):
-            lane = number % plan.threads
-            first = strip * program.strip_rows
-            rows = min(program.strip_rows, program.lattice.count[1] - first)
-            values = {
-                **common, **self._own[lane], "sun": sun, "first_row": program.lattice.first[1] + first,
-                "map": self._maps[lane], "ledger": self._ledgers[lane],
-            }  # fmt: skip
-            lanes[lane] += [self._bind(kernel, step.dim(rows), values) for step, kernel in kernels]
-        self._closing = self._record_closing()
-        return lanes
+    def _scene_state(self) -> SceneState:
+        """Make the device's view of the scene when something first asks for it."""
+        if self._state is None:
+            self._state = SceneState(self.plan.facts, self.plan.device)
+        return self._state
 
-    def _record_closing(self) -> list[Any]:
-        facts, program = self.plan.facts, self.plan.program
-        colours = len(facts.irradiance)
-        # A cell's flux over a pixel's area is its share of the pixel; each direction of the sun has its own share.
-        share = program.lattice.step**2 * facts.sun_share * unit(program.accumulate)
-        scale = [share * facts.irradiance[i % colours] for i in range(3)]
-        one_sun = wp.vec3(*(facts.sun_share * facts.irradiance[i % colours] for i in range(3)))
-        resolve = make_resolve(program.accumulate, facts.spec.channels, colours)
-        values = {
-            "lanes": self._maps, "scale": wp.vec3d(*scale), "map": self._caustic_map, "scene": self._state.scene,
-            "suns": self._state.suns, "pixel": wp.vec2(*facts.pixel), "columns": facts.scene.map.resolution[0],
-            "irradiance": one_sun, "colours": colours, "dry": self._dry,
-        }  # fmt: skip
-        closing = [self._bind(resolve, self._caustic_map.shape, values)]
-        if facts.spec.shore:
-            columns, rows = facts.scene.map.resolution
-            closing.append(self._bind(make_dry_land(facts.spec), (rows, columns), values))
-        return closing
 
-    def _bind(self, kernel: wp.Kernel, dim: tuple[int, ...], values: Mapping[str, Any]) -> Any:
-        """Record a launch; a parameter whose buffer was left out gets an array without elements."""
-        arguments = []
-        for argument in kernel.adj.args:
-            name = argument.label.removesuffix(OUTPUT)
-            if name in values:
-                arguments.append(values[name])
-            elif name in LEFT_OUT:
-                kind: Any = argument.type
-                arguments.append(wp.empty((0,) * kind.ndim, dtype=kind.dtype, device=self.plan.device))
-            else:
-                raise RenderError(f"kernel {kernel.key}: nothing in the plan is called {name!r}")
-        return wp.launch(kernel, dim=dim, inputs=arguments, device=self.plan.device, record_cmd=True)
+def _run(lane: list[Command]) -> None:
+    for command in lane:
+        command.launch()
 
-    def _run(self, lane: int) -> None:
-        self._maps[lane].zero_()
-        self._ledgers[lane].zero_()
-        if lane == 0:
-            self._dry.zero_()
-        for launch in self._lanes[lane]:
-            launch.launch()
+
+def _read(array: wp.array | None) -> np.ndarray | None:
+    return None if array is None else array.numpy().copy()
 
 
 def make_renderer(

@@ -45,11 +45,12 @@ class Result:
         [s].
     plan : Plan
         What was done for it.
-    caustic_map : ndarray
+    caustic_map : ndarray or None
         Flux per horizontal area, float32 ``[rows, columns]`` or ``[rows, columns, 3]``, in the units of the sun's
-        irradiance; row 0 at the map's origin. Its sum times the pixel's area is the flux.
-    energy : Energy
-        Where the light went [W].
+        irradiance; row 0 at the map's origin. Its sum times the pixel's area is the flux. None for screen-space
+        methods.
+    energy : Energy or None
+        Where the light went [W]; None for methods that follow no light.
     seconds : float
         Time of the frame, compilation apart.
     picture : None
@@ -58,6 +59,8 @@ class Result:
         Relative L2 error that a reference's map may have (RMSE over mean); None for the other methods.
     notes : tuple of str
         What of this frame alone is to be known.
+    own_screen_map : ndarray or None
+        What a screen-space method made; read :attr:`screen_map`.
     """
 
     scene: Scene
@@ -65,18 +68,22 @@ class Result:
     device: str
     time: float
     plan: Plan | ReferencePlan
-    caustic_map: np.ndarray
-    energy: Energy
+    caustic_map: np.ndarray | None
+    energy: Energy | None
     seconds: float
     assets: Assets = field(repr=False)
     picture: np.ndarray | None = None
     error_bar: float | None = None
     notes: tuple[str, ...] = ()
+    own_screen_map: np.ndarray | None = field(default=None, repr=False)
 
     @cached_property
     def surface_irradiance(self) -> np.ndarray | None:
-        """The map per area of the receiver itself, ``caustic_map / sqrt(1 + |grad z|^2)``; None for meshes."""
-        if receiver_kind(self.scene) == "mesh" or self.assets.objects is not None:
+        """The map per area of the receiver itself, ``caustic_map / sqrt(1 + |grad z|^2)``.
+
+        None for meshes, and where there is no map.
+        """
+        if self.caustic_map is None or receiver_kind(self.scene) == "mesh" or self.assets.objects is not None:
             return None
         slopes = receiver_slopes(self.scene, self.assets)
         scale = 1.0 / np.sqrt(1.0 + (slopes**2).sum(axis=-1))
@@ -88,18 +95,30 @@ class Result:
     def screen_map(self) -> np.ndarray | None:
         """Irradiance on the surface that each pixel of the camera sees, ``[rows, columns]``; None without a camera.
 
-        Made when it is first asked for: a map alone compiles and launches nothing for an eye. See :mod:`.screen`.
+        A screen-space method has made it. Else it is the map, looked at, when it is first asked for: a map alone
+        compiles and launches nothing for an eye. See :mod:`.screen`.
         """
-        if self.scene.camera is None:
+        if self.own_screen_map is not None:
+            return self.own_screen_map
+        if self.scene.camera is None or self.caustic_map is None:
             return None
         from .screen import look
 
         return look(self.scene, self.assets, self.caustic_map, self.device)
 
     @property
+    def image(self) -> np.ndarray:
+        """What the method makes, and :meth:`save` writes: its map, or what the camera sees."""
+        made = self.caustic_map if self.caustic_map is not None else self.own_screen_map
+        assert made is not None  # every method makes one of the two
+        return made
+
+    @property
     def warnings(self) -> list[str]:
         """What to know before trusting the map."""
         notes = [*self.plan.warnings, *self.notes]
+        if self.energy is None:
+            return notes
         emitted, over_lit = np.max(self.energy.emitted), np.max(self.energy.over_lit)
         if over_lit > OVER_LIT_LIMIT * emitted:
             notes.append(
@@ -119,6 +138,8 @@ class Result:
     def save(self, path: str | os.PathLike[str], limits: tuple[float, float] | None = None) -> Path:
         """Write the map as EXR, or as a PNG picture, by the file's ending; whole, or not at all.
 
+        A screen-space method's is what the camera sees: its PNG has the camera's pixels and nothing beside them.
+
         Parameters
         ----------
         path
@@ -134,20 +155,24 @@ class Result:
         """
         from . import __version__
         from .exr import write_map
-        from .png import write_png
+        from .png import write_picture, write_png
+        from .tone import to_rgb8, value_limits
 
-        path = Path(path)
-        scene = self.scene
+        path, scene, image = Path(path), self.scene, self.image
+        in_plan = self.caustic_map is not None
+        title = f"{scene.name}, {self.method}, t = {self.time:g} s"
         if path.suffix.lower() == ".exr":
             write_map(
-                path, self.caustic_map, scene_text=scene.to_toml(), version=__version__, method=self.method,
-                units=UNITS, origin=scene.map.origin, size=scene.map.size, energy=self.energy, time=self.time,
+                path, image, scene_text=scene.to_toml(), version=__version__, method=self.method,
+                units=UNITS, energy=self.energy or {}, time=self.time,
+                origin=scene.map.origin if in_plan else None, size=scene.map.size if in_plan else None,
             )  # fmt: skip
-        elif path.suffix.lower() == ".png":
-            write_png(
-                path, self.caustic_map, origin=scene.map.origin, size=scene.map.size, units=UNITS, limits=limits,
-                title=f"{scene.name}, {self.method}, t = {self.time:g} s",
-            )  # fmt: skip
-        else:
+        elif path.suffix.lower() != ".png":
             raise InputError(f"{path}: expected a file that ends in .exr or .png")
+        elif in_plan:
+            write_png(
+                path, image, origin=scene.map.origin, size=scene.map.size, units=UNITS, limits=limits, title=title
+            )
+        else:
+            write_picture(path, to_rgb8(image, limits or value_limits(image)), metadata={"Title": title})
         return path

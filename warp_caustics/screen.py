@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .assets import TriangleMesh
+from .eye import eye_view
 from .g_buffer import rasterize
 from .receiver import receiver_heights, receiver_kind
 from .triangles import mesh_triangles
-from .views import EyeView
 
 if TYPE_CHECKING:
     from .assets import Assets
@@ -39,9 +39,9 @@ def look(scene: Scene, assets: Assets, caustic_map: np.ndarray, device: str) -> 
     camera = scene.camera
     if camera is None:
         return None
-    view = EyeView(camera.position, camera.target, camera.vertical_fov, camera.resolution)
+    view = eye_view(camera)
     origin = (*scene.map.origin, scene.water.level)
-    triangles = mesh_triangles(*_receiver_meshes(scene, assets), origin=origin, device=device)
+    triangles = mesh_triangles(*receiver_meshes(scene, assets), origin=origin, device=device)
     seen = rasterize(triangles, view, normals="face", ids=False)
     assert seen.depth is not None and seen.normal is not None
     points = view.projection().positions(seen.depth.numpy())
@@ -51,7 +51,8 @@ def look(scene: Scene, assets: Assets, caustic_map: np.ndarray, device: str) -> 
     return np.asarray(light * (lean if light.ndim == 2 else lean[..., None]), dtype=np.float32)
 
 
-def _receiver_meshes(scene: Scene, assets: Assets) -> list[TriangleMesh]:
+def receiver_meshes(scene: Scene, assets: Assets) -> list[TriangleMesh]:
+    """Triangles of all that light can land on over the map, in world coordinates; the objects come last."""
     meshes = [mesh for mesh in (assets.mesh, assets.objects) if mesh is not None]
     kind = receiver_kind(scene)
     if kind == "mesh":

@@ -118,6 +118,5 @@ def reasons(scene: Scene, spec: Spec, suns: int) -> tuple[Reason, ...]:
         ("torn cells", spec.breaks, "a cell's corners may meet different fates", "neighbouring rays stay neighbours"),
         ("BVH", meshes, "meshes in the scene", "no meshes"),
         ("sun's disk", suns > 1, f"{suns} directions share the flux", "one direction: its disk is a point"),
-        ("camera", False, "", "this method does not look" if scene.camera else "no camera"),
     )
     return tuple(Reason(what, kept, why if kept else why_not) for what, kept, why, why_not in table)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from warp_caustics.errors import RenderError
+from warp_caustics.errors import InputError, RenderError
 from warp_caustics.tone import RGB, is_colour, to_rgb8
 
 if TYPE_CHECKING:
@@ -76,6 +76,8 @@ def view(result: Result, *, screenshot: str | Path | None = None) -> None:
     RenderError
         If nothing can be drawn on this machine, or no window opened.
     """
+    if result.caustic_map is None:
+        raise InputError(f'method "{result.method}" makes what the camera sees; the view shows maps in plan view')
     check_can_show(window=screenshot is None)
     with _quiet_vtk():
         plotter = make_plotter(result, off_screen=screenshot is not None)
@@ -117,6 +119,7 @@ def make_plotter(result: Result, *, off_screen: bool) -> pv.Plotter:
     from warp_caustics.assets import load_assets
 
     scene = result.scene
+    assert result.caustic_map is not None  # view has seen to it
     assets = load_assets(scene)
     plotter = pv.Plotter(off_screen=off_screen, window_size=list(WINDOW), lighting="none")
     plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])  # type: ignore[arg-type]  # its decorator loses self

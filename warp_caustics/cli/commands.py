@@ -105,7 +105,7 @@ def render(
             renderer.render(time + index / fps)
             result = renderer.result()
             # One scale for all pictures of a sequence, or it would flicker.
-            limits = limits or value_limits(result.caustic_map)
+            limits = limits or value_limits(result.image)
             for path in paths(index):
                 with interrupt.hold():
                     result.save(path, limits=limits)

@@ -116,7 +116,8 @@ def print_result(
     table.add_row("memory", f"{result.plan.bytes:,} bytes ({_mebibytes(result.plan.bytes)})")
     out = console()
     out.print(table)
-    out.print(_energy_table(result.energy))
+    if result.energy is not None:
+        out.print(_energy_table(result.energy))
     for warning in result.warnings:
         out.print(f"warning: {escape(warning)}", style="yellow")
 

@@ -38,7 +38,7 @@ def measured_row(trial: Trial, reference: Reference, device: str, threads: int |
     finite = bool(np.isfinite(measured.result.caustic_map).all())
     return Row(
         **common,
-        settings={**asked, **measured.plan.program.settings},
+        settings={**asked, **measured.plan.settings},
         status="measured" if finite else "broken",
         reason=None if finite else BROKEN,
         errors=_errors(measured, reference),
@@ -60,7 +60,7 @@ def _errors(measured: Measured, reference: Reference) -> Errors:
 def _speed(measured: Measured) -> Speed:
     plan = measured.plan
     lower, seconds, upper = (float(quartile) for quartile in np.percentile(measured.seconds, QUARTILES))
-    samples = plan.program.lattice.cells * len(plan.facts.suns)
+    samples = plan.samples
     return Speed(
         milliseconds=1e3 * seconds,
         milliseconds_low=1e3 * lower,

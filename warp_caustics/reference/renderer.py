@@ -60,7 +60,7 @@ class ReferenceRenderer:
         plan, start = self.plan, perf_counter()
         reference = make_reference(plan.facts.scene, time, device=plan.device, threads=plan.threads)
         self._made = (time, perf_counter() - start, reference)
-        return Frame(wp.array(reference.caustic_map, dtype=wp.float32, device=plan.device), time)
+        return Frame(wp.array(reference.caustic_map, dtype=wp.float32, device=plan.device), None, time)
 
     def result(self) -> Result:
         """Give the last frame; converge the one at time 0 first if there is none."""
