@@ -41,6 +41,24 @@ def relative_l2(caustic_map: np.ndarray, reference: np.ndarray) -> float:
     return _over(math.sqrt(float(np.mean(difference**2))), reference)
 
 
+def best_scale(caustic_map: np.ndarray, reference: np.ndarray) -> float:
+    """The one factor that brings a map nearest to the reference in the mean square; 1 for a map that is dark.
+
+    For methods whose brightness is a matter of taste: :func:`relative_l2` of the scaled map tells how far its pattern
+    is from the truth. Parameters are those of :func:`relative_l2`.
+
+    Returns
+    -------
+    float
+        1 as well for a map that is not finite, which no factor mends.
+    """
+    values = np.asarray(caustic_map, dtype=np.float64)
+    power = float(np.sum(values**2))
+    if not (math.isfinite(power) and power > 0.0):
+        return 1.0
+    return float(np.sum(values * reference) / power)
+
+
 def bias(caustic_map: np.ndarray, reference: np.ndarray) -> float:
     """Mean of the difference over the reference's mean, signed: how much too bright the map is as a whole.
 

@@ -102,9 +102,10 @@ class Result:
             return self.own_screen_map
         if self.scene.camera is None or self.caustic_map is None:
             return None
-        from .screen import look
+        from .screen import Gaze
 
-        return look(self.scene, self.assets, self.caustic_map, self.device)
+        gaze = Gaze(self.scene, self.assets, self.scene.camera, self.device)
+        return gaze.light(self.caustic_map).astype(np.float32)
 
     @property
     def image(self) -> np.ndarray:

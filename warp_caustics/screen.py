@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,41 +15,70 @@ from .triangles import mesh_triangles
 
 if TYPE_CHECKING:
     from .assets import Assets
-    from .scene import Scene
+    from .scene import Camera, Scene
 
 
-def look(scene: Scene, assets: Assets, caustic_map: np.ndarray, device: str) -> np.ndarray | None:
-    """Irradiance on the surface that each pixel of the camera sees, along straight lines through the water.
+class Gaze:
+    """Where on the map each pixel of a camera looks, along straight lines through the water.
 
     Parameters
     ----------
     scene, assets
         The scene and its files.
-    caustic_map : ndarray
-        Flux per horizontal area, ``[rows, columns]`` or ``[rows, columns, 3]``.
+    camera : Camera
+        Its eye.
     device : str
         Where to rasterize.
+    samples : int
+        Lines of sight along each side of a pixel, whose light is averaged.
 
-    Returns
-    -------
-    ndarray or None
-        float32 ``[camera rows, camera columns]`` (and colours), row 0 at the bottom of the picture, 0 where the eye
-        sees no part of the map; None without a camera. Where one part of the receiver hides another from above, both
-        get the light of both, since the map adds them up.
+    Attributes
+    ----------
+    inside : ndarray
+        bool ``[camera rows, camera columns]``: all lines of sight end on the map.
     """
-    camera = scene.camera
-    if camera is None:
-        return None
-    view = eye_view(camera)
-    origin = (*scene.map.origin, scene.water.level)
-    triangles = mesh_triangles(*receiver_meshes(scene, assets), origin=origin, device=device)
-    seen = rasterize(triangles, view, normals="face", ids=False)
-    assert seen.depth is not None and seen.normal is not None
-    points = view.projection().positions(seen.depth.numpy())
-    # Light per horizontal area, on a surface that leans: the same light on more area.
-    lean = np.abs(seen.normal.numpy()[..., 2])
-    light = _sample(scene, caustic_map, points)
-    return np.asarray(light * (lean if light.ndim == 2 else lean[..., None]), dtype=np.float32)
+
+    def __init__(self, scene: Scene, assets: Assets, camera: Camera, device: str, samples: int = 1) -> None:
+        columns, rows = camera.resolution
+        view = replace(eye_view(camera), resolution=(columns * samples, rows * samples))
+        origin = (*scene.map.origin, scene.water.level)
+        triangles = mesh_triangles(*receiver_meshes(scene, assets), origin=origin, device=device)
+        seen = rasterize(triangles, view, normals="face", ids=False)
+        assert seen.depth is not None and seen.normal is not None
+        points = view.projection().positions(seen.depth.numpy())
+        with np.errstate(invalid="ignore"):
+            at = (points[..., :2] - scene.map.origin) / scene.map.size
+            hit = np.asarray(np.logical_and(at >= 0.0, at <= 1.0).all(axis=-1))
+        self._samples = samples
+        self._at = np.where(hit[..., None], at, 0.0).astype(np.float32)
+        # Light per horizontal area, on a surface that leans: the same light on more area. Nothing comes from elsewhere.
+        self._lean = np.abs(seen.normal.numpy()[..., 2]) * hit
+        self.inside = self._blocks(hit).all(axis=(1, 3))
+
+    def light(self, image: np.ndarray) -> np.ndarray:
+        """Irradiance on the surface that each pixel sees, of a map in flux per horizontal area.
+
+        Parameters
+        ----------
+        image : ndarray
+            ``[rows, columns]`` or ``[rows, columns, 3]``, of any resolution; bilinear between the middles of its pixels.
+
+        Returns
+        -------
+        ndarray
+            ``[camera rows, camera columns]`` (and colours), row 0 at the bottom of the picture, 0 where the eye sees no
+            part of the map. Where one part of the receiver hides another from above, both get the light of both, since
+            the map adds them up.
+        """
+        channels = np.atleast_3d(image)
+        seen = [self._blocks(_bilinear(channels[..., c], self._at) * self._lean).mean(axis=(1, 3))
+                for c in range(channels.shape[2])]  # fmt: skip
+        return np.stack(seen, axis=-1) if image.ndim == 3 else seen[0]
+
+    def _blocks(self, image: np.ndarray) -> np.ndarray:
+        """View samples as ``[camera rows, samples, camera columns, samples]``."""
+        rows, columns = (side // self._samples for side in image.shape)
+        return image.reshape(rows, self._samples, columns, self._samples)
 
 
 def receiver_meshes(scene: Scene, assets: Assets) -> list[TriangleMesh]:
@@ -68,16 +98,14 @@ def receiver_meshes(scene: Scene, assets: Assets) -> list[TriangleMesh]:
     return [TriangleMesh(vertices, triangles), *meshes]
 
 
-def _sample(scene: Scene, image: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """The map at points ``[..., 3]``, bilinear between pixel centres; 0 beside it."""
-    columns, rows = scene.map.resolution
-    with np.errstate(invalid="ignore"):
-        at = (points[..., :2] - scene.map.origin) / scene.map.size * (columns, rows)
-        inside = np.logical_and(at >= 0.0, at <= (columns, rows)).all(axis=-1)
-    at = np.clip(np.where(np.expand_dims(inside, -1), at, 0.0) - 0.5, 0.0, (columns - 1.0, rows - 1.0))
-    low = np.minimum(at.astype(int), (max(columns - 2, 0), max(rows - 2, 0)))
-    high = np.minimum(low + 1, (columns - 1, rows - 1))
-    u, v = np.moveaxis(at - low, -1, 0)
-    weights = np.stack([(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v]) * inside
-    corners = [image[y, x] for y in (low[..., 1], high[..., 1]) for x in (low[..., 0], high[..., 0])]
-    return np.asarray(sum(w[(...,) + (None,) * (image.ndim - 2)] * c for w, c in zip(weights, corners, strict=True)))
+def _bilinear(image: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """One channel at positions ``[..., 2]`` (x, y), as shares of its sides."""
+    rows, columns = image.shape
+    at = np.clip(at * np.float32([columns, rows]) - np.float32(0.5), 0.0, np.float32([columns - 1, rows - 1]))
+    low = np.minimum(at.astype(np.int32), (max(columns - 2, 0), max(rows - 2, 0)))
+    right, up = np.moveaxis(at - low, -1, 0)
+    x, y = np.moveaxis(low, -1, 0)
+    next_x, next_y = np.minimum(x + 1, columns - 1), np.minimum(y + 1, rows - 1)
+    below = (1.0 - right) * image[y, x] + right * image[y, next_x]
+    above = (1.0 - right) * image[next_y, x] + right * image[next_y, next_x]
+    return np.asarray((1.0 - up) * below + up * above)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -11,15 +12,15 @@ from rich.table import Table
 from warp_caustics.cli.report import console
 
 if TYPE_CHECKING:
-    from warp_caustics.comparison.record import Comparison, Row
+    from warp_caustics.comparison.record import Comparison, Errors, Row
 
 FRONT_MARK, TIE_MARK = "*", "~"
 MEGA, MEBI = 1e6, 2**20
 MANY_PERCENT, FEW_PERCENT = 100.0, 0.1  # no digit after the point from the first on, powers of ten below the second
 FEW_MILLISECONDS = 10.0  # below, decimals tell
-ERROR_COLUMNS = ("error %", "bias %", "energy %", "p99.9 %")
+ERROR_COLUMNS = ("error %", "scaled %", "eye %", "eye scaled %", "bias %", "energy %", "p99.9 %")
 SPEED_COLUMNS = ("ms", "spread", "build s", "MiB", "M/s")
-NEEDED_WIDTH = 110  # a narrower terminal folds the lines; cut columns would be lost
+NEEDED_WIDTH = 140  # a narrower terminal folds the lines; cut columns would be lost
 
 
 def print_comparison(comparison: Comparison) -> None:
@@ -34,13 +35,21 @@ def print_comparison(comparison: Comparison) -> None:
     came = "from the cache" if reference.cached else "made now"
     out.print(
         f"reference: error bar {reference.error_bar:.2e}, {reference.samples:,.0f} samples per pixel, "
-        f"{reference.seconds:.1f} s, {came}\n"
+        f"{reference.seconds:.1f} s, {came}"
     )
+    if comparison.screen is not None:
+        screen = comparison.screen
+        out.print(
+            f"in {screen.resolution[0]} x {screen.resolution[1]} eye pixels: error bar {screen.error_bar:.2e}, "
+            f"{screen.pixels:,} of them see the map alone and are judged"
+        )
+    out.print()
     width, out.width = out.width, max(out.width, NEEDED_WIDTH)
     out.print(_settings(comparison))
     out.width = width
     out.print(
-        "errors over the mean of the reference; ms: median of warm frames, spread: their quartiles' distance over it; "
+        "error: in the map's pixels, eye: in the camera's, scaled: after the best single factor; over the mean of the "
+        "reference; ms: median of warm frames, spread: their quartiles' distance over it; "
         "M/s: million cells or photons a second"
     )
     out.print(
@@ -77,17 +86,28 @@ def _settings(comparison: Comparison) -> Table:
 
 
 def _cells(row: Row, *, with_flip: bool) -> list[str]:
-    errors, speed = row.errors, row.speed
-    assert errors is not None and speed is not None
-    marks = (FRONT_MARK if row.on_front else " ") + (TIE_MARK if row.at_error_bar else " ")
-    flip = ["-" if errors.flip is None else f"{errors.flip:.4f}"] if with_flip else []
+    errors, eye, speed = row.errors, row.screen_errors, row.speed
+    judged = errors or eye
+    assert speed is not None
+    front = row.on_front or (errors is None and row.on_screen_front)
+    marks = (FRONT_MARK if front else " ") + (TIE_MARK if row.at_error_bar else " ")
+    flip = [_shown(errors, "flip", "{:.4f}".format)] if with_flip else []
     spread = (speed.milliseconds_high - speed.milliseconds_low) / speed.milliseconds
     decimals = 1 if speed.milliseconds >= FEW_MILLISECONDS else 3
     return [
-        marks, escape(row.label), _percent(errors.relative_l2), _signed(errors.bias), _signed(errors.energy_error),
-        _percent(errors.percentile_999), *flip, f"{speed.milliseconds:,.{decimals}f}", f"{spread:.0%}",
+        marks, escape(row.label), _shown(errors, "relative_l2", _percent),
+        _shown(errors, "scaled_l2", _percent), _shown(eye, "relative_l2", _percent),
+        _shown(eye, "scaled_l2", _percent), _shown(judged, "bias", _signed),
+        _shown(judged, "energy_error", _signed), _shown(judged, "percentile_999", _percent),
+        *flip, f"{speed.milliseconds:,.{decimals}f}", f"{spread:.0%}",
         f"{speed.compile_seconds:.2f}", f"{speed.bytes / MEBI:,.1f}", f"{speed.samples_per_second / MEGA:,.1f}",
     ]  # fmt: skip
+
+
+def _shown(errors: Errors | None, name: str, how: Callable[[float], str]) -> str:
+    """Show one of the errors, or a dash where there is none."""
+    value = None if errors is None else getattr(errors, name)
+    return "-" if value is None else how(value)
 
 
 def _print_refused(out: Console, comparison: Comparison) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,7 +12,7 @@ if TYPE_CHECKING:
     from matplotlib.text import Annotation
     from matplotlib.transforms import Bbox
 
-    from warp_caustics.comparison.record import Comparison, Row
+    from warp_caustics.comparison.record import Comparison, Errors, Row
 
 INCHES = (12.0, 8.0)
 DPI = 120
@@ -55,36 +56,91 @@ def draw(comparison: Comparison) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=INCHES, dpi=DPI, layout="tight")
+    panels = _panels(comparison)
+    figure = Figure(figsize=(INCHES[0], INCHES[1] * len(panels)), dpi=DPI, layout="tight")
     FigureCanvasAgg(figure)
-    axes = figure.add_subplot()
-    bar = max(comparison.reference.error_bar, LEAST_BAR)
-    shown = [row for row in comparison.rows if row.errors is not None and math.isfinite(row.errors.relative_l2)]
-    points = [_point(row, bar) for row in shown]
-    _scale(axes, points, bar)
-    axes.axhspan(axes.get_ylim()[0], bar, color=BAR_COLOUR, zorder=0)
-    said = f"error bar of the reference, {comparison.reference.error_bar:.1e}: errors in here are ties"
+    names = list(dict.fromkeys(row.series for row in comparison.rows if row.status == "measured"))
+    colours = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(names)}
+    column = figure.subplots(len(panels), squeeze=False)[:, 0]
+    drawn = [_draw_panel(axes, panel, comparison, colours) for axes, panel in zip(column, panels, strict=True)]
+    figure.draw_without_rendering()  # lays the axes out, so that labels can be placed in pixels
+    for axes, panel, caption in drawn:
+        _place_labels(axes, panel, colours, caption)
+    return figure
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes: rows with an error of one kind.
+
+    Attributes
+    ----------
+    rows : list of Row
+        Those that have the error.
+    points : list of (float, float)
+        Milliseconds and error of each, as drawn.
+    best : list of bool
+        Which of them are on the front.
+    bar : float
+        The reference's error bar, as drawn.
+    error_bar : float
+        As it is.
+    heading : str
+        What the error is taken over.
+    """
+
+    rows: list[Row]
+    points: list[tuple[float, float]]
+    best: list[bool]
+    bar: float
+    error_bar: float
+    heading: str
+
+
+def _panels(comparison: Comparison) -> list[Panel]:
+    """Maps in plan view, and what the camera sees where there is one."""
+    columns, rows = comparison.resolution
+    panels = []
+    in_plan = [(row, row.errors, row.on_front) for row in comparison.rows]
+    panels.append(_panel(in_plan, comparison.reference.error_bar, f"{columns} x {rows} pixels"))
+    if comparison.screen is not None:
+        columns, rows = comparison.screen.resolution
+        seen = [(row, row.screen_errors, row.on_screen_front) for row in comparison.rows]
+        panels.append(_panel(seen, comparison.screen.error_bar, f"{columns} x {rows} eye pixels"))
+    return panels
+
+
+def _panel(found: list[tuple[Row, Errors | None, bool]], error_bar: float, heading: str) -> Panel:
+    bar = max(error_bar, LEAST_BAR)
+    shown = [
+        (row, (row.speed.milliseconds, max(errors.relative_l2, BELOW_THE_BAR * bar)), best)
+        for row, errors, best in found
+        if errors is not None and row.speed is not None and math.isfinite(errors.relative_l2)
+    ]
+    rows, points, best = ([one[i] for one in shown] for i in range(3))
+    return Panel(rows, points, best, bar, error_bar, heading)  # type: ignore[arg-type]  # by column
+
+
+def _draw_panel(
+    axes: Axes, panel: Panel, comparison: Comparison, colours: dict[str, str]
+) -> tuple[Axes, Panel, Annotation]:
+    _scale(axes, panel.points, panel.bar)
+    axes.axhspan(axes.get_ylim()[0], panel.bar, color=BAR_COLOUR, zorder=0)
+    said = f"error bar of the reference, {panel.error_bar:.1e}: errors in here are ties"
     caption = axes.annotate(
         said, (1.0, 0.0), (-6, 5),
         xycoords="axes fraction", textcoords="offset points", ha="right", va="bottom", fontsize=LABEL_SIZE,
     )  # fmt: skip
-    front = [_point(row, bar) for row in comparison.front]
+    front = sorted(point for point, best in zip(panel.points, panel.best, strict=True) if best)
     if front:
         axes.plot(*zip(*front, strict=True), color=FRONT_COLOUR, lw=5, alpha=0.16, zorder=1, label="front")
-    names = list(dict.fromkeys(row.series for row in shown))
-    for number, name in enumerate(names):
-        _draw_series(axes, [row for row in shown if row.series == name], bar, COLOURS[number % len(COLOURS)])
-    _describe(axes, comparison)
-    colours = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(names)}
-    figure.draw_without_rendering()  # lays the axes out, so that labels can be placed in pixels
-    _place_labels(axes, shown, points, colours, caption)
-    return figure
-
-
-def _point(row: Row, bar: float) -> tuple[float, float]:
-    """Milliseconds and error, as drawn."""
-    assert row.speed is not None and row.errors is not None
-    return row.speed.milliseconds, max(row.errors.relative_l2, BELOW_THE_BAR * bar)
+    for name in dict.fromkeys(row.series for row in panel.rows):
+        points = [point for row, point in zip(panel.rows, panel.points, strict=True) if row.series == name]
+        axes.plot(*zip(*points, strict=True), "-o", color=colours[name], lw=1.0, ms=5, zorder=2, label=name)
+    if front:
+        axes.plot(*zip(*front, strict=True), "o", ms=10, mfc="none", mec=FRONT_COLOUR, mew=1.3, zorder=3)
+    _describe(axes, comparison, panel.heading)
+    return axes, panel, caption
 
 
 def _scale(axes: Axes, points: list[tuple[float, float]], bar: float) -> None:
@@ -96,20 +152,11 @@ def _scale(axes: Axes, points: list[tuple[float, float]], bar: float) -> None:
         axes.set_ylim(min(errors) / ROOM, max(errors) * ROOM)
 
 
-def _draw_series(axes: Axes, rows: list[Row], bar: float, colour: str) -> None:
-    points = [_point(row, bar) for row in rows]
-    axes.plot(*zip(*points, strict=True), "-o", color=colour, lw=1.0, ms=5, zorder=2, label=rows[0].series)
-    best = [point for row, point in zip(rows, points, strict=True) if row.on_front]
-    if best:
-        axes.plot(*zip(*best, strict=True), "o", ms=10, mfc="none", mec=FRONT_COLOUR, mew=1.3, zorder=3)
-
-
-def _describe(axes: Axes, comparison: Comparison) -> None:
+def _describe(axes: Axes, comparison: Comparison, heading: str) -> None:
     where = comparison.machine
-    columns, rows = comparison.resolution
     threads = f", {where.threads} thread(s)" if where.device == "cpu" else ""
     axes.set_title(
-        f"{comparison.scene_name}, {columns} x {rows} pixels: error against time per frame\n"
+        f"{comparison.scene_name}, {heading}: error against time per frame\n"
         f"{where.device_name}{threads}; rings: on the front; figures: samples per pixel, or window N",
         fontsize=11, parse_math=False,
     )  # fmt: skip
@@ -121,21 +168,19 @@ def _describe(axes: Axes, comparison: Comparison) -> None:
         axes.legend(fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
 
 
-def _place_labels(
-    axes: Axes, rows: list[Row], points: list[tuple[float, float]], colours: dict[str, str], caption: Annotation
-) -> None:
+def _place_labels(axes: Axes, panel: Panel, colours: dict[str, str], caption: Annotation) -> None:
     """Put each label at the nearest free place beside its point: none over another label, a point or the caption."""
     from matplotlib.patheffects import withStroke
 
     canvas: Any = axes.figure.canvas  # of Agg, whose renderer measures text
     renderer = canvas.get_renderer()
     scale = DPI / POINTS_PER_INCH
-    pixels = axes.transData.transform(points)
+    pixels = axes.transData.transform(panel.points)
     frame = _box(axes.get_window_extent(renderer))
     half = MARKER * scale
     taken: list[Box] = [(x - half, y - half, x + half, y + half) for x, y in pixels]
     taken.append(_box(caption.get_window_extent(renderer)))
-    for row, (x, y) in zip(rows, pixels, strict=True):
+    for row, (x, y) in zip(panel.rows, pixels, strict=True):
         short = row.label if row.series == row.method else row.label.removeprefix(f"{row.method} ")
         text = axes.annotate(
             short, (x, y), (0.0, 0.0), xycoords="figure pixels", textcoords="offset points", fontsize=LABEL_SIZE,

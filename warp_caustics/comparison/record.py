@@ -54,15 +54,32 @@ class Errors(Part):
         description="mean of the difference over the mean of the reference, signed: the light in the map against that "
         "in the reference's, for whatever reason"
     )
-    energy_error: float = Field(
+    energy_error: float | None = Field(
+        default=None,
         description="light that the method made (above 0) or lost (below 0) by its ledger, against the reference's own "
-        "balance, over the light in the reference's map: 0 if all light went somewhere, be it the wrong place"
+        "balance, over the light in the reference's map: 0 if all light went somewhere, be it the wrong place; null "
+        "for methods that follow no light, and in eye pixels",
     )
+    scale: float | None = Field(
+        default=None, description="the one factor that brings the map nearest to the reference in the mean square"
+    )
+    scaled_l2: float | None = Field(default=None, description="relative L2 error of the map times that factor")
     percentile_999: float = Field(
         description="absolute difference that 99.9 % of the values stay under, over the mean of the reference"
     )
     flip: float | None = Field(
         default=None, description="mean HDR-FLIP at fixed exposures, 0 to 1; null where it was skipped"
+    )
+
+
+class ScreenRecord(Part):
+    """The reference as the scene's camera sees it, which screen-space methods are judged by."""
+
+    resolution: tuple[int, int] = Field(description="columns, rows of the camera")
+    pixels: int = Field(description="eye pixels that are judged: those that see nothing but the map's receiver")
+    error_bar: float = Field(
+        description="relative L2 error that it may have: the reference's own, and the change when it is carried from a "
+        "map of half the resolution"
     )
 
 
@@ -94,10 +111,20 @@ class Row(Part):
         description="broken: the map is not finite, its errors are infinite; refused: the method cannot do this scene"
     )
     reason: str | None = Field(default=None, description="why it is broken or refused")
-    errors: Errors | None = Field(default=None, description="null where refused")
+    errors: Errors | None = Field(
+        default=None, description="of the map in plan view; null where refused, and for screen-space methods"
+    )
+    screen_errors: Errors | None = Field(
+        default=None,
+        description="in eye pixels: of what a screen-space method makes, or of the map as the camera sees it; null "
+        "without a camera",
+    )
     speed: Speed | None = Field(default=None, description="null where refused")
     on_front: bool = Field(
         default=False, description="more accurate than every faster setting; errors under the error bar are ties"
+    )
+    on_screen_front: bool = Field(
+        default=False, description="the same by the errors in eye pixels; times are of the maps, their look-up apart"
     )
     at_error_bar: bool = Field(
         default=False, description="error under the reference's error bar: not told apart from others there"
@@ -147,6 +174,7 @@ class Comparison(Part):
     time: float = Field(description="on the water's clock [s]")
     resolution: tuple[int, int] = Field(description="columns, rows of the map")
     reference: ReferenceRecord
+    screen: ScreenRecord | None = Field(default=None, description="null without a camera")
     rows: list[Row]
     slopes: list[Slope]
     published: list[Published]
@@ -156,6 +184,12 @@ class Comparison(Part):
     def front(self) -> list[Row]:
         """Rows on the Pareto front of error against time, fastest first."""
         found = [(row.speed.milliseconds, row) for row in self.rows if row.speed is not None and row.on_front]
+        return [row for _, row in sorted(found, key=lambda pair: pair[0])]
+
+    @property
+    def screen_front(self) -> list[Row]:
+        """Rows on the front of the errors in eye pixels against time, fastest first."""
+        found = [(row.speed.milliseconds, row) for row in self.rows if row.speed is not None and row.on_screen_front]
         return [row for _, row in sorted(found, key=lambda pair: pair[0])]
 
     def to_json(self) -> str:

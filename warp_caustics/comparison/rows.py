@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,8 +18,10 @@ from warp_caustics.comparison.slopes import fit_slope
 
 if TYPE_CHECKING:
     from warp_caustics.comparison.measure import Measured
+    from warp_caustics.comparison.screen import CarriedReference
     from warp_caustics.comparison.trials import Trial
     from warp_caustics.reference import Reference
+    from warp_caustics.result import Result
 
 QUARTILES = (25.0, 50.0, 75.0)
 """The median of a few times, and a spread that one disturbed frame does not make."""
@@ -26,7 +29,23 @@ QUARTILES = (25.0, 50.0, 75.0)
 BROKEN = "the map has values that are not finite"
 
 
-def measured_row(trial: Trial, reference: Reference, device: str, threads: int | None, time: float) -> Row:
+@dataclass(frozen=True)
+class Truth:
+    """What settings are judged by.
+
+    Attributes
+    ----------
+    reference : Reference
+        In plan view.
+    carried : CarriedReference or None
+        As the camera sees it; None without one.
+    """
+
+    reference: Reference
+    carried: CarriedReference | None
+
+
+def measured_row(trial: Trial, truth: Truth, device: str, threads: int | None, time: float) -> Row:
     """Measure a setting, or say why it cannot be."""
     from warp_caustics.comparison.measure import measure
 
@@ -35,25 +54,45 @@ def measured_row(trial: Trial, reference: Reference, device: str, threads: int |
     if trial.refusal is not None:
         return Row(**common, settings=asked, status="refused", reason=trial.refusal)
     measured = measure(trial.scene, device, threads, time)
-    finite = bool(np.isfinite(measured.result.caustic_map).all())
+    finite = bool(np.isfinite(measured.result.image).all())
     return Row(
         **common,
         settings={**asked, **measured.plan.settings},
         status="measured" if finite else "broken",
         reason=None if finite else BROKEN,
-        errors=_errors(measured, reference),
+        errors=_map_errors(measured.result, truth.reference),
+        screen_errors=_screen_errors(measured.result, truth.carried),
         speed=_speed(measured),
     )
 
 
-def _errors(measured: Measured, reference: Reference) -> Errors:
-    caustic_map, truth = measured.result.caustic_map, reference.caustic_map
+def _map_errors(result: Result, reference: Reference) -> Errors | None:
+    if result.caustic_map is None:
+        return None
+    energy = None if result.energy is None else metrics.energy_error(result.energy, reference.energy)
+    flip = None if why_not() else flip_error(result.caustic_map, reference.caustic_map)
+    return _errors(result.caustic_map, reference.caustic_map, energy_error=energy, flip=flip)
+
+
+def _screen_errors(result: Result, carried: CarriedReference | None) -> Errors | None:
+    if carried is None or not carried.irradiance.size:
+        return None
+    if result.caustic_map is not None:
+        return _errors(carried.carried(result.caustic_map), carried.irradiance)
+    return _errors(carried.judged(result.image), carried.irradiance)
+
+
+def _errors(image: np.ndarray, truth: np.ndarray, **more: float | None) -> Errors:
+    if image.ndim < truth.ndim:
+        image = np.repeat(image[..., None], truth.shape[-1], axis=-1)
+    scale = metrics.best_scale(image, truth)
     return Errors(
-        relative_l2=metrics.relative_l2(caustic_map, truth),
-        bias=metrics.bias(caustic_map, truth),
-        energy_error=metrics.energy_error(measured.result.energy, reference.energy),
-        percentile_999=metrics.percentile_error(caustic_map, truth),
-        flip=None if why_not() else flip_error(caustic_map, truth),
+        relative_l2=metrics.relative_l2(image, truth),
+        bias=metrics.bias(image, truth),
+        percentile_999=metrics.percentile_error(image, truth),
+        scale=scale,
+        scaled_l2=metrics.relative_l2(scale * image, truth),
+        **more,
     )
 
 
@@ -74,21 +113,27 @@ def _speed(measured: Measured) -> Speed:
     )
 
 
-def with_front(rows: Sequence[Row], error_bar: float) -> list[Row]:
-    """Mark the rows on the front, and those whose errors the reference cannot tell apart."""
-    timed = [row for row in rows if row.speed is not None and row.errors is not None]
-    seconds = [row.speed.milliseconds for row in timed if row.speed is not None]
-    errors = [row.errors.relative_l2 for row in timed if row.errors is not None]
-    marks = {id(row): mark for row, mark in zip(timed, on_front(seconds, errors, error_bar), strict=True)}
+def with_fronts(rows: Sequence[Row], truth: Truth) -> list[Row]:
+    """Mark the rows on the fronts, of maps and of eye pixels, and those that the reference cannot tell apart."""
+    bar, carried = truth.reference.error_bar, truth.carried
+    maps = _marks([row.errors for row in rows], rows, bar)
+    screens = _marks([row.screen_errors for row in rows], rows, 0.0 if carried is None else carried.error_bar)
     return [
         row.model_copy(
             update={
-                "on_front": marks.get(id(row), False),
-                "at_error_bar": row.errors is not None and row.errors.relative_l2 < error_bar,
+                "on_front": on_map,
+                "on_screen_front": on_screen,
+                "at_error_bar": row.errors is not None and row.errors.relative_l2 < bar,
             }
         )
-        for row in rows
+        for row, on_map, on_screen in zip(rows, maps, screens, strict=True)
     ]
+
+
+def _marks(errors: Sequence[Errors | None], rows: Sequence[Row], bar: float) -> list[bool]:
+    """Tell which rows are on a front; a row without an error is on none."""
+    seconds = [math.inf if row.speed is None else row.speed.milliseconds for row in rows]
+    return on_front(seconds, [math.inf if error is None else error.relative_l2 for error in errors], bar)
 
 
 def slopes_of(rows: Sequence[Row], error_bar: float) -> list[Slope]:

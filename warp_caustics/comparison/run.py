@@ -7,17 +7,25 @@ import platform
 from collections.abc import Callable, Sequence
 from datetime import datetime, timezone
 from statistics import median
+from typing import TYPE_CHECKING
 
 from warp_caustics.comparison import machine
 from warp_caustics.comparison.flip import why_not
 from warp_caustics.comparison.jittered import jittered_slope
 from warp_caustics.comparison.published import PUBLISHED, PublishedSpeed
-from warp_caustics.comparison.record import Comparison, Machine, Published, ReferenceRecord
-from warp_caustics.comparison.rows import measured_row, slopes_of, with_front
+from warp_caustics.comparison.record import Comparison, Machine, Published, ReferenceRecord, ScreenRecord
+from warp_caustics.comparison.rows import Truth, measured_row, slopes_of, with_fronts
 from warp_caustics.comparison.settings import chosen_methods, with_settings
 from warp_caustics.comparison.trials import plan_trials
 from warp_caustics.errors import InputError
 from warp_caustics.scene import GatherSettings, Scene, load_scene
+
+FINER = 2
+"""Pixels of the map that the eye's reference is carried from, along a side of a pixel of the scene's own."""
+
+if TYPE_CHECKING:
+    from warp_caustics.comparison.screen import CarriedReference
+    from warp_caustics.reference import Reference
 
 Tell = Callable[[int, int, str], None]
 """Is told, before each step: its number from 0, how many there are, and what it is."""
@@ -72,10 +80,17 @@ def compare(
 
     tell(0, steps, "reference")
     reference = make_reference(scene, time, device=device, threads=threads)
+    carried = None
+    if any(trial.looks for trial in trials):
+        tell(0, steps, "reference for the eye")
+        columns, rows = scene.map.resolution
+        fine = scene.at_resolution(FINER * columns, FINER * rows)
+        carried = _carried(fine, make_reference(fine, time, device=device, threads=threads), device)
+    truth = Truth(reference, carried)
     rows = []
     for number, trial in enumerate(trials, 1):
         tell(number, steps, trial.label)
-        rows.append(measured_row(trial, reference, device, threads, time))
+        rows.append(measured_row(trial, truth, device, threads, time))
     ours = {}
     for number, speed in enumerate(published, 1 + len(trials)):
         tell(number, steps, f"gather, {speed.work}")
@@ -98,11 +113,31 @@ def compare(
             error_bar=reference.error_bar, samples=reference.samples, seconds=reference.seconds,
             cached=reference.cached,
         ),
-        rows=with_front(rows, reference.error_bar),
+        screen=_screen_record(scene, truth),
+        rows=with_fronts(rows, truth),
         slopes=[*slopes_of(rows, reference.error_bar), jittered],
         published=[_published(speed, ours.get(speed)) for speed in PUBLISHED],
         flip_skipped=why_not(),
     )  # fmt: skip
+
+
+def _carried(scene: Scene, reference: Reference, device: str) -> CarriedReference | None:
+    if scene.camera is None:
+        return None
+    from warp_caustics.assets import load_assets
+    from warp_caustics.comparison.screen import CarriedReference
+
+    return CarriedReference(scene, load_assets(scene), scene.camera, reference, device)
+
+
+def _screen_record(scene: Scene, truth: Truth) -> ScreenRecord | None:
+    if scene.camera is None or truth.carried is None:
+        return None
+    return ScreenRecord(
+        resolution=scene.camera.resolution,
+        pixels=len(truth.carried.irradiance),
+        error_bar=truth.carried.error_bar,
+    )
 
 
 def _ours(speed: PublishedSpeed, scene: Scene, device: str, threads: int | None, time: float) -> float | None:

@@ -25,6 +25,8 @@ class Trial:
         With this method and these settings.
     refusal : str or None
         Why it cannot be measured.
+    looks : bool
+        Whether it is judged in eye pixels alone.
     """
 
     series: Series
@@ -32,6 +34,7 @@ class Trial:
     label: str
     scene: Scene
     refusal: str | None
+    looks: bool = False
 
 
 def plan_trials(scene: Scene, names: Sequence[str], device: str, threads: int | None) -> list[Trial]:
@@ -59,4 +62,4 @@ def _planned(series: Series, settings: Settings, scene: Scene, device: str, thre
     except InputError as error:
         return Trial(series, settings, label(series, settings, {}), scene, str(error))
     assert isinstance(plan, Plan)
-    return Trial(series, settings, label(series, settings, plan.program.settings), scene, None)
+    return Trial(series, settings, label(series, settings, plan.settings), scene, None, plan.program.looks)
