@@ -24,6 +24,7 @@ from scenery import METHODS, save_box, wave
 
 import warp_caustics as wc
 from oracle.cases import sunlight
+from warp_caustics.dispersion import DispersedPlan
 
 FRAMES = 7
 THREADS = 2
@@ -96,7 +97,8 @@ def measure(table: Table, method: str, look: bool = False) -> Cost:
     plan = renderer.plan
     if not renderer.result().caustic_map.any():
         raise RuntimeError("a map without light is not worth timing")
-    lines = sum(code_lines(step.kernel) for step in plan.program.passes)
+    one = plan.plans[0] if isinstance(plan, DispersedPlan) else plan  # channels share their kernels
+    lines = sum(code_lines(step.kernel) for step in one.program.passes)
     return Cost(plan.launches, len(plan.kernels), plan.bytes, lines, min(milliseconds[1:]))
 
 

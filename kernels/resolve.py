@@ -44,6 +44,26 @@ def make_resolve(accumulate: str, channels: int, colours: int) -> wp.Kernel:
     return resolve
 
 
+@wp.kernel(enable_backward=False)
+def stack(
+    # In:
+    red: wp.array[float],
+    green: wp.array[float],
+    blue: wp.array[float],
+    each: int,
+    # Out:
+    map_out: wp.array[float],
+):
+    """Join three maps into one in colour; each brings 1 value a pixel, or 3 of which its own channel's counts.
+
+    One thread a pixel.
+    """
+    i = wp.tid()
+    map_out[3 * i] = red[i * each]
+    map_out[3 * i + 1] = green[i * each + each // 2]
+    map_out[3 * i + 2] = blue[i * each + each - 1]
+
+
 @functools.cache
 def make_dry_land(spec: Spec) -> wp.Kernel:
     """Light dry land directly: E max(0, -I_z + z_x I_x + z_y I_y) on the part of a pixel that is dry and in the sun."""

@@ -86,11 +86,6 @@ def test_a_camera_adds_nothing_to_a_method_that_does_not_look(device, method):
     )
 
 
-def test_dispersion_is_not_yet():
-    with pytest.raises(wc.InputError, match="not yet"):
-        scene(GENTLE, medium={"ior": (1.331, 1.334, 1.339), "dispersion": "traced"})
-
-
 @pytest.mark.parametrize("name", MARKS)
 def test_code_of_a_feature_is_generated_only_where_it_is_on(name):
     mark, change = MARKS[name]

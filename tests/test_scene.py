@@ -215,7 +215,7 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
         ),
         (
             {"medium": {"ior": 1.3, "dispersion": "traced"}},
-            'medium.dispersion: expected "none", got "traced": not yet in this version',
+            'medium: expected an ior by channel, "fresh" or "sea" with dispersion: one index bends all colours alike',
         ),
         ({"medium": {"ior": 1.3, "fresnel": 1}}, "medium.fresnel: expected true or false, got 1"),
         (

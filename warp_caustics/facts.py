@@ -88,7 +88,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     """
     check_covered(scene, assets)
     ior, warnings = scene.medium.green_ior, []
-    if len(set(scene.medium.ior_by_channel)) > 1:
+    if len(set(scene.medium.ior_by_channel)) > 1 and scene.medium.dispersion == "none":
         warnings.append(f"medium.ior: given by channel without dispersion, so green's {ior:g} serves for all")
     pixel = np.asarray(scene.map.size, dtype=np.float64) / np.asarray(scene.map.resolution)
     slopes = extreme_slopes(scene, assets)

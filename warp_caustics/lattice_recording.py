@@ -27,6 +27,8 @@ class LatticeRecording:
         As :class:`~warp_caustics.recording.Recording`.
     maps, ledgers : wp.array
         Of each lane.
+    flat_map : wp.array
+        The caustic map as ``[rows * columns * colours]``.
     """
 
     def __init__(self, plan: Plan, program: Program, state: SceneState) -> None:
@@ -38,7 +40,7 @@ class LatticeRecording:
 
     def energy(self) -> Energy:
         """Read back the ledger."""
-        return read_energy(self._plan, self._program, self.ledgers.numpy(), self._flat.numpy(), self._dry.numpy())
+        return read_energy(self._plan, self._program, self.ledgers.numpy(), self.flat_map.numpy(), self._dry.numpy())
 
     def _allocate(self) -> None:
         plan, device = self._plan, self._plan.device
@@ -47,8 +49,8 @@ class LatticeRecording:
         accumulator = ACCUMULATOR[self._program.accumulate]
         self.maps = wp.zeros((plan.threads, *buffers["map"].shape), dtype=accumulator, device=device)
         self.ledgers = wp.zeros((plan.threads, *buffers["ledger"].shape), dtype=wp.float64, device=device)
-        self._flat = wp.zeros(buffers["caustic_map"].shape, dtype=wp.float32, device=device)
-        self.caustic_map = shaped(self._flat, rows, columns, len(plan.facts.irradiance))
+        self.flat_map = wp.zeros(buffers["caustic_map"].shape, dtype=wp.float32, device=device)
+        self.caustic_map = shaped(self.flat_map, rows, columns, len(plan.facts.irradiance))
         self._dry = wp.zeros(buffers["dry"].shape if "dry" in buffers else 0, dtype=wp.float64, device=device)
         self._own = [
             {
@@ -89,11 +91,11 @@ class LatticeRecording:
         one_sun = wp.vec3(*(facts.sun_share * facts.irradiance[i % colours] for i in range(3)))
         resolve = make_resolve(program.accumulate, facts.spec.channels, colours)
         values: dict[str, Any] = {
-            "lanes": self.maps, "scale": wp.vec3d(*scale), "map": self._flat, "scene": self._state.scene,
+            "lanes": self.maps, "scale": wp.vec3d(*scale), "map": self.flat_map, "scene": self._state.scene,
             "suns": self._state.suns, "pixel": wp.vec2(*facts.pixel), "columns": facts.scene.map.resolution[0],
             "irradiance": one_sun, "colours": colours, "dry": self._dry,
         }  # fmt: skip
-        closing = [bind(resolve, self._flat.shape, values, self._plan.device)]
+        closing = [bind(resolve, self.flat_map.shape, values, self._plan.device)]
         if facts.spec.shore:
             columns, rows = facts.scene.map.resolution
             closing.append(bind(make_dry_land(facts.spec), (rows, columns), values, self._plan.device))

@@ -7,12 +7,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from .assets import load_assets
+from .dispersion import CHANNELS, DispersedPlan, channel_scene
 from .errors import InputError
 from .facts import Facts, gather_facts
 from .magnitude import check_asset_magnitudes, check_magnitudes
-from .methods import METHODS
+from .methods import DISPERSING, METHODS
 from .program import MOST_WORK, Buffer, Program
 from .scene import Scene, known_method, load_scene
+from .scene.faults import quoted
 from .sequence import Sequence
 from .simulation import SimulationPass, frame_launches, simulation_buffers, simulation_passes, step_launches
 from .specify import Reason
@@ -149,7 +151,7 @@ def make_plan(
     method: str | None = None,
     device: str | None = None,
     threads: int | None = None,
-) -> Plan | ReferencePlan:
+) -> Plan | DispersedPlan | ReferencePlan:
     """Plan a scene: which passes and buffers it needs, and why the others are left out.
 
     Nothing is compiled and nothing is allocated on a device.
@@ -168,7 +170,8 @@ def make_plan(
     Returns
     -------
     Plan
-        Or, for the method ``"reference"``, a ReferencePlan, which prints and counts alike.
+        Or, for the method ``"reference"``, a ReferencePlan, and for traced dispersion in plan view, a DispersedPlan;
+        they print and count alike.
 
     Raises
     ------
@@ -182,24 +185,55 @@ def make_plan(
     name = known_method(method if method is not None else scene.method.name)
     device = resolve_device(device)
     check_magnitudes(scene)
-    check_map_fits(scene, device, free_memory(device))
+    lanes, free = resolve_threads(threads, device), free_memory(device)
+    check_map_fits(scene, device, free)
     assets = load_assets(scene)
     check_asset_magnitudes(assets)
     facts = gather_facts(scene, assets)
     if name == "reference":
         from .reference.plan import plan_reference
 
-        return plan_reference(facts, device, resolve_threads(threads, device), free_memory(device))
+        return plan_reference(facts, device, lanes, free)
+    room = Room(device, lanes, fewer=threads is None, free=free)
+    if scene.medium.dispersion != "none" and name not in DISPERSING:
+        return _plan_by_channel(facts, name, room)
+    return _plan(facts, name, room)
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a plan may use: a device, its threads (fewer if need be and the user named none), and free memory."""
+
+    device: str
+    threads: int
+    fewer: bool
+    free: int
+
+
+def _plan_by_channel(facts: Facts, name: str, room: Room) -> DispersedPlan:
+    """Plan each channel by itself."""
+    scene, room = facts.scene, replace(room, free=room.free // len(CHANNELS))
+    if scene.medium.dispersion == "post":
+        raise InputError(
+            f'medium.dispersion = "post" shifts channels of what a camera sees, and method "{name}" makes a map; '
+            f'expected "traced", or method {quoted(DISPERSING)}'
+        )
+    plans = [_plan(gather_facts(channel_scene(scene, c), facts.assets), name, room) for c in range(3)]
+    if not isinstance(plans[0].program, Program):
+        raise InputError(f'medium.dispersion = "{scene.medium.dispersion}": method "{name}" refracts no light')
+    return DispersedPlan(facts, (plans[0], plans[1], plans[2]))
+
+
+def _plan(facts: Facts, name: str, room: Room) -> Plan:
     program = METHODS[name](facts)
     check_work(facts, program)
-    lanes = min(resolve_threads(threads, device), program.lanes(facts))
-    plan = Plan(name, device, lanes, facts, program, _buffers(facts, program))
-    free = free_memory(device)
-    if plan.bytes > SPARE_MEMORY * free and threads is None:
+    lanes = min(room.threads, program.lanes(facts))
+    plan = Plan(name, room.device, lanes, facts, program, _buffers(facts, program))
+    if plan.bytes > SPARE_MEMORY * room.free and room.fewer:
         # Each thread has a map of its own; with fewer there may be room.
         plan = replace(plan, threads=1)
-    if plan.bytes > SPARE_MEMORY * free:
-        raise InputError(_too_large(plan, free) + (" or threads" if lanes > 1 else ""))
+    if plan.bytes > SPARE_MEMORY * room.free:
+        raise InputError(_too_large(plan, room.free) + (" or threads" if lanes > 1 else ""))
     return plan
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -11,9 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import warp as wp
 
+from .dispersed_recording import DispersedRecording
+from .dispersion import DispersedPlan
 from .errors import InputError
 from .lattice_recording import LatticeRecording
 from .plan import Plan, make_plan
+from .program import Program
 from .recording import Command, Recording
 from .result import Result
 from .scene import Scene, load_scene
@@ -76,10 +80,10 @@ class Renderer:
         threads: int | None = None,
     ) -> None:
         plan = make_plan(scene, method, device, threads)
-        if not isinstance(plan, Plan):
+        if not isinstance(plan, Plan | DispersedPlan):
             raise InputError("method: a reference is converged anew for each frame; use warp_caustics.render(...)")
-        self.plan: Plan = plan
-        self._state: SceneState | None = None
+        self.plan: Plan | DispersedPlan = plan
+        self._states: list[SceneState] = []
         # Pinned on the host, so that the copy can be part of a captured frame.
         self._host_clock = wp.zeros(1, dtype=wp.float32, device="cpu", pinned=plan.device != "cpu")
         self._clock = wp.zeros(1, dtype=wp.float32, device=plan.device)
@@ -106,8 +110,8 @@ class Renderer:
         """
         check_time(time)
         start = perf_counter()
-        if self._state is not None:
-            self._state.write(time)
+        for state in self._states:
+            state.write(time)
         self._host_clock.numpy()[0] = time
         wp.copy(self._clock, self._host_clock)
         for stage in self._recording.stages:
@@ -128,7 +132,7 @@ class Renderer:
         InputError
             If the method does not look, or the camera has another resolution.
         """
-        if not isinstance(self._recording, SequenceRecording) or not self.plan.program.looks:
+        if not isinstance(self._recording, SequenceRecording) or self._recording.screen_map is None:
             raise InputError(f'method "{self.plan.method}" does not look through a camera')
         was = self.plan.facts.scene.camera
         if was is not None and camera.resolution != was.resolution:
@@ -146,7 +150,7 @@ class Renderer:
         wp.synchronize_device(self.plan.device)
         waited = perf_counter() - start if self.plan.device != "cpu" else 0.0
         facts, recording = self.plan.facts, self._recording
-        water = None if self._state is None else self._state.simulated
+        waters = [state.simulated for state in self._states if state.simulated is not None]
         return Result(
             scene=facts.scene,
             method=self.plan.method,
@@ -158,20 +162,26 @@ class Renderer:
             seconds=self._seconds + waited,
             assets=facts.assets,
             own_screen_map=_read(recording.screen_map),
-            notes=() if water is None else water.warnings(),
+            notes=waters[0].warnings() if waters else (),
         )
 
     def _record(self) -> Recording:
-        program = self.plan.program
-        if isinstance(program, Sequence):
-            return SequenceRecording(self.plan, program, self._scene_state, self._clock)
-        return LatticeRecording(self.plan, program, self._scene_state())
+        plan = self.plan
+        if isinstance(plan, DispersedPlan):
+            return DispersedRecording(plan, [self._record_lattice(channel) for channel in plan.plans])
+        if isinstance(plan.program, Sequence):
+            # What the kernels know of the scene is made when the first of them asks for it.
+            state = functools.cache(lambda: self._scene_state(plan))
+            return SequenceRecording(plan, plan.program, state, self._clock)
+        return self._record_lattice(plan)
 
-    def _scene_state(self) -> SceneState:
-        """Make the device's view of the scene when something first asks for it."""
-        if self._state is None:
-            self._state = SceneState(self.plan.facts, self.plan.device)
-        return self._state
+    def _record_lattice(self, plan: Plan) -> LatticeRecording:
+        assert isinstance(plan.program, Program)
+        return LatticeRecording(plan, plan.program, self._scene_state(plan))
+
+    def _scene_state(self, plan: Plan) -> SceneState:
+        self._states.append(SceneState(plan.facts, plan.device))
+        return self._states[-1]
 
 
 def _run(lane: list[Command]) -> None:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import os
 
     from .assets import Assets
+    from .dispersion import DispersedPlan
     from .energy import Energy
     from .plan import Plan
     from .reference.plan import ReferencePlan
@@ -67,7 +68,7 @@ class Result:
     method: str
     device: str
     time: float
-    plan: Plan | ReferencePlan
+    plan: Plan | DispersedPlan | ReferencePlan
     caustic_map: np.ndarray | None
     energy: Energy | None
     seconds: float

@@ -61,7 +61,8 @@ class Gaze:
         Parameters
         ----------
         image : ndarray
-            ``[rows, columns]`` or ``[rows, columns, 3]``, of any resolution; bilinear between the middles of its pixels.
+            ``[rows, columns]`` or ``[rows, columns, 3]``, of any resolution, bilinear between the middles of its
+            pixels.
 
         Returns
         -------
@@ -101,7 +102,8 @@ def receiver_meshes(scene: Scene, assets: Assets) -> list[TriangleMesh]:
 def _bilinear(image: np.ndarray, at: np.ndarray) -> np.ndarray:
     """One channel at positions ``[..., 2]`` (x, y), as shares of its sides."""
     rows, columns = image.shape
-    at = np.clip(at * np.float32([columns, rows]) - np.float32(0.5), 0.0, np.float32([columns - 1, rows - 1]))
+    sides = np.array([columns, rows], dtype=np.float32)
+    at = np.clip(at * sides - np.float32(0.5), np.float32(0.0), sides - np.float32(1.0))
     low = np.minimum(at.astype(np.int32), (max(columns - 2, 0), max(rows - 2, 0)))
     right, up = np.moveaxis(at - low, -1, 0)
     x, y = np.moveaxis(low, -1, 0)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from warp_caustics.renderer import Renderer
 
 if TYPE_CHECKING:
+    from warp_caustics.dispersion import DispersedPlan
     from warp_caustics.plan import Plan
     from warp_caustics.result import Result
     from warp_caustics.scene import Scene
@@ -42,7 +43,7 @@ class Measured:
         Of each timed frame.
     """
 
-    plan: Plan
+    plan: Plan | DispersedPlan
     result: Result
     compile_seconds: float
     seconds: tuple[float, ...]

@@ -83,8 +83,7 @@ def compare(
     carried = None
     if any(trial.looks for trial in trials):
         tell(0, steps, "reference for the eye")
-        columns, rows = scene.map.resolution
-        fine = scene.at_resolution(FINER * columns, FINER * rows)
+        fine = scene.at_resolution(*(FINER * side for side in scene.map.resolution))
         carried = _carried(fine, make_reference(fine, time, device=device, threads=threads), device)
     truth = Truth(reference, carried)
     rows = []

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from warp_caustics.comparison.settings import Series, Settings, label, series_of, with_settings
+from warp_caustics.dispersion import DispersedPlan
 from warp_caustics.errors import InputError
 from warp_caustics.plan import Plan, make_plan
 from warp_caustics.scene import Scene
@@ -61,5 +62,6 @@ def _planned(series: Series, settings: Settings, scene: Scene, device: str, thre
         plan = make_plan(scene, device=device, threads=threads)
     except InputError as error:
         return Trial(series, settings, label(series, settings, {}), scene, str(error))
-    assert isinstance(plan, Plan)
-    return Trial(series, settings, label(series, settings, plan.settings), scene, None, plan.program.looks)
+    assert isinstance(plan, Plan | DispersedPlan)
+    looks = isinstance(plan, Plan) and plan.program.looks
+    return Trial(series, settings, label(series, settings, plan.settings), scene, None, looks)

@@ -19,3 +19,6 @@ if TYPE_CHECKING:
 
 METHODS: dict[str, Callable[[Facts], Program]] = {"beam": beam, "photon": photon, "gather": gather}
 """By name."""
+
+DISPERSING = ("cascaded",)
+"""Methods that disperse light themselves; all others that follow light are given a channel at a time."""

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..assets import load_assets
-from ..device import resolve_device, resolve_threads
+from ..device import free_memory, resolve_device, resolve_threads
+from ..dispersion import CHANNELS, channel_scene, own_channel, stacked_energy
 from ..energy import Energy
 from ..errors import InputError
 from ..facts import gather_facts
@@ -20,6 +21,7 @@ from ..scene import Scene, load_scene
 from ..water import check_time
 from . import cache as disk
 from .converge import LAND_PARTS, Budget, Level, converge
+from .plan import plan_reference
 from .roads import Roads
 
 if TYPE_CHECKING:
@@ -100,6 +102,8 @@ def make_reference(
         If the scene, device, threads, time or tolerance cannot be used.
     """
     facts, device, threads = _prepared(scene, time, device, threads)
+    if facts.scene.medium.dispersion != "none":
+        return _dispersed(facts.scene, time, tolerance, device, threads, cache)
     settings = facts.scene.method.reference
     budget = Budget(settings.tolerance if tolerance is None else tolerance, settings.rays)
     if not (budget.tolerance > 0.0 and np.isfinite(budget.tolerance)):
@@ -108,6 +112,7 @@ def make_reference(
     stored = disk.load(name) if cache else None
     if stored is not None:
         return Reference(**stored, cached=True)
+    plan_reference(facts, device, threads, free_memory(device))  # refuses what would take days, or more memory
     start = perf_counter()
     roads = Roads(facts, time, device, threads)
     level = converge(roads, facts, budget)
@@ -115,6 +120,27 @@ def make_reference(
     if cache:
         disk.store(name, made)
     return made
+
+
+def _dispersed(scene: Scene, time: float, tolerance: float | None, device: str, threads: int, cache: bool) -> Reference:
+    """Converge each channel by itself."""
+    made = [
+        make_reference(channel_scene(scene, c), time, tolerance=tolerance, device=device, threads=threads, cache=cache)
+        for c in range(len(CHANNELS))
+    ]
+    caustic_map = np.stack([own_channel(np.atleast_3d(one.caustic_map), c) for c, one in enumerate(made)], axis=-1)
+    # Each bar is an error over its own channel's mean; together they are one over the mean of all.
+    errors = [one.error_bar * caustic_map[..., c].mean() for c, one in enumerate(made)]
+    mean = float(caustic_map.mean())
+    return Reference(
+        caustic_map=caustic_map,
+        energy=stacked_energy([one.energy for one in made]),
+        error_bar=float(np.sqrt(np.mean(np.square(errors)))) / mean if mean > 0.0 else 0.0,
+        samples=float(np.mean([one.samples for one in made])),
+        seconds=sum(one.seconds for one in made),
+        cached=all(one.cached for one in made),
+        notes=tuple(dict.fromkeys(note for one in made for note in one.notes)),
+    )
 
 
 def jittered_photons(
@@ -143,6 +169,14 @@ def jittered_photons(
         float64 ``[rows, columns]`` or ``[rows, columns, 3]``.
     """
     facts, device, threads = _prepared(scene, time, device, threads)
+    if facts.scene.medium.dispersion != "none":
+        channels = [
+            jittered_photons(
+                channel_scene(facts.scene, c), time, per_side=per_side, seed=seed, device=device, threads=threads
+            )
+            for c in range(len(CHANNELS))
+        ]
+        return np.stack([own_channel(np.atleast_3d(one), c) for c, one in enumerate(channels)], axis=-1)
     roads = Roads(facts, time, device, threads)
     return _map(facts, roads.photons(per_side, seed).flux, roads.land(LAND_PARTS * per_side))
 

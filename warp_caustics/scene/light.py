@@ -105,10 +105,14 @@ class Medium(Model):
         default=None, description="instead of absorption: Jerlov's water type, K_d over the vertical depth"
     )
     fresnel: Truth = Field(default=False, description="the surface reflects some of the light away")
-    dispersion: Annotated[str, one_of("none", not_yet=("traced", "post"))] = Field(
-        default="none", description="colours refract apart"
+    dispersion: Annotated[str, one_of("none", "traced", "post")] = Field(
+        default="none",
+        description="colours refract apart: each channel's own light is followed, or channels are shifted afterwards "
+        "(cascaded alone); needs an ior by channel",
     )
-    dispersion_strength: Positive = Field(default=1.0, description="1 is physical; only with dispersion")
+    dispersion_strength: Positive = Field(
+        default=1.0, description="times by which the indices differ from green's; 1 is physical; only with dispersion"
+    )
 
     @classmethod
     def rules(cls, given: Mapping[str, Any]) -> Iterator[str]:
@@ -116,6 +120,8 @@ class Medium(Model):
         yield from super().rules(given)
         if {"absorption", "jerlov"} <= given.keys():
             yield "expected absorption or jerlov, got both: one goes with the path, the other with the depth"
+        if given.get("dispersion", "none") != "none" and isinstance(given.get("ior"), int | float):
+            yield 'expected an ior by channel, "fresh" or "sea" with dispersion: one index bends all colours alike'
         if "dispersion_strength" in given and given.get("dispersion", "none") == "none":
             yield 'expected no dispersion_strength, since dispersion is "none"'
 
@@ -125,6 +131,13 @@ class Medium(Model):
         if isinstance(self.ior, str):
             return IOR_TABLE[self.ior]
         return self.ior if isinstance(self.ior, tuple) else (self.ior, self.ior, self.ior)
+
+    @property
+    def dispersed_ior(self) -> tuple[float, float, float]:
+        """The index by which each channel refracts under dispersion, at its strength."""
+        green = self.green_ior
+        red, _, blue = (green + self.dispersion_strength * (ior - green) for ior in self.ior_by_channel)
+        return red, green, blue
 
     @property
     def green_ior(self) -> float:

@@ -46,9 +46,9 @@ class Scene(Model):
 
     @property
     def channels(self) -> int:
-        """Three when light or its loss has colour, else one; an ior by channel alone makes none without dispersion."""
+        """Three when light, its loss or its refraction has colour, else one."""
         coloured = isinstance(self.sun.irradiance, tuple) or isinstance(self.medium.absorption, tuple)
-        return 3 if coloured or self.medium.jerlov is not None else 1
+        return 3 if coloured or self.medium.jerlov is not None or self.medium.dispersion != "none" else 1
 
     def at_resolution(self, columns: int, rows: int) -> Scene:
         """Return the scene with another number of pixels on the same map.
