@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,9 @@ INCHES = (12.0, 8.0)
 DPI = 120
 COLOURS = ("#0b5fa5", "#4fb0e8", "#b3261e", "#e8894f", "#8a6d1d", "#8e63b8", "#2a7f4f", "#555555", "#c2568e")
 """Of the series in their order; neighbours differ in lightness, too."""
+
+MARKERS = "os^Dv"
+"""Of the series in their order: the first of them while the colours last, then the next, so that no two look alike."""
 
 BAR_COLOUR, FRONT_COLOUR = "#d9dee5", "#1b1f24"
 LABEL_SIZE = 8.0
@@ -43,6 +47,7 @@ LEAST_BAR = 1e-8
 """Drawn for a reference that is exact, as of flat water: below float32 there is nothing to tell."""
 
 Box = tuple[float, float, float, float]
+Look = tuple[str, str]  # colour and marker
 
 
 def draw(comparison: Comparison) -> Figure:
@@ -60,12 +65,15 @@ def draw(comparison: Comparison) -> Figure:
     figure = Figure(figsize=(INCHES[0], INCHES[1] * len(panels)), dpi=DPI, layout="tight")
     FigureCanvasAgg(figure)
     names = list(dict.fromkeys(row.series for row in comparison.rows if row.status == "measured"))
-    colours = {name: COLOURS[number % len(COLOURS)] for number, name in enumerate(names)}
+    looks = {
+        name: (COLOURS[number % len(COLOURS)], MARKERS[number // len(COLOURS) % len(MARKERS)])
+        for number, name in enumerate(names)
+    }
     column = figure.subplots(len(panels), squeeze=False)[:, 0]
-    drawn = [_draw_panel(axes, panel, comparison, colours) for axes, panel in zip(column, panels, strict=True)]
+    drawn = [_draw_panel(axes, panel, comparison, looks) for axes, panel in zip(column, panels, strict=True)]
     figure.draw_without_rendering()  # lays the axes out, so that labels can be placed in pixels
     for axes, panel, caption in drawn:
-        _place_labels(axes, panel, colours, caption)
+        _place_labels(axes, panel, looks, caption)
     return figure
 
 
@@ -122,7 +130,7 @@ def _panel(found: list[tuple[Row, Errors | None, bool]], error_bar: float, headi
 
 
 def _draw_panel(
-    axes: Axes, panel: Panel, comparison: Comparison, colours: dict[str, str]
+    axes: Axes, panel: Panel, comparison: Comparison, looks: Mapping[str, Look]
 ) -> tuple[Axes, Panel, Annotation]:
     _scale(axes, panel.points, panel.bar)
     axes.axhspan(axes.get_ylim()[0], panel.bar, color=BAR_COLOUR, zorder=0)
@@ -136,7 +144,8 @@ def _draw_panel(
         axes.plot(*zip(*front, strict=True), color=FRONT_COLOUR, lw=5, alpha=0.16, zorder=1, label="front")
     for name in dict.fromkeys(row.series for row in panel.rows):
         points = [point for row, point in zip(panel.rows, panel.points, strict=True) if row.series == name]
-        axes.plot(*zip(*points, strict=True), "-o", color=colours[name], lw=1.0, ms=5, zorder=2, label=name)
+        colour, marker = looks[name]
+        axes.plot(*zip(*points, strict=True), "-", marker=marker, color=colour, lw=1.0, ms=5, zorder=2, label=name)
     if front:
         axes.plot(*zip(*front, strict=True), "o", ms=10, mfc="none", mec=FRONT_COLOUR, mew=1.3, zorder=3)
     _describe(axes, comparison, panel.heading)
@@ -168,7 +177,7 @@ def _describe(axes: Axes, comparison: Comparison, heading: str) -> None:
         axes.legend(fontsize=9, loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
 
 
-def _place_labels(axes: Axes, panel: Panel, colours: dict[str, str], caption: Annotation) -> None:
+def _place_labels(axes: Axes, panel: Panel, looks: Mapping[str, Look], caption: Annotation) -> None:
     """Put each label at the nearest free place beside its point: none over another label, a point or the caption."""
     from matplotlib.patheffects import withStroke
 
@@ -184,7 +193,7 @@ def _place_labels(axes: Axes, panel: Panel, colours: dict[str, str], caption: An
         short = row.label if row.series == row.method else row.label.removeprefix(f"{row.method} ")
         text = axes.annotate(
             short, (x, y), (0.0, 0.0), xycoords="figure pixels", textcoords="offset points", fontsize=LABEL_SIZE,
-            color=colours[row.series], zorder=4, path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            color=looks[row.series][0], zorder=4, path_effects=[withStroke(linewidth=2.5, foreground="white")],
         )  # fmt: skip
         extent = text.get_window_extent(renderer)
         size = extent.width, extent.height
@@ -194,7 +203,7 @@ def _place_labels(axes: Axes, panel: Panel, colours: dict[str, str], caption: An
         if math.hypot(*offset) > LEADER_FROM * scale + max(size):
             axes.annotate(
                 "", (x, y), (box[0] + size[0] / 2, box[1] + size[1] / 2), xycoords="figure pixels",
-                arrowprops={"arrowstyle": "-", "color": colours[row.series], "lw": 0.5, "alpha": 0.6},
+                arrowprops={"arrowstyle": "-", "color": looks[row.series][0], "lw": 0.5, "alpha": 0.6},
             )  # fmt: skip
 
 
