@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenery import GENTLE, scene
+from scenery import GENTLE, save_quad, scene
 
 import warp_caustics as wc
 from warp_caustics.cli import main
@@ -63,9 +63,9 @@ def pool() -> wc.Scene:
 
 
 @pytest.fixture
-def hills() -> wc.Scene:
+def ramp(tmp_path) -> wc.Scene:
     """A receiver that the gather cannot serve."""
-    return scene(GENTLE, receiver={"terrain": {"base": 0.2, "slope": (0.05, 0.02)}}, resolution=(16, 12))
+    return scene(GENTLE, receiver={"mesh": save_quad(tmp_path, slope=(0.05, 0.02))}, resolution=(16, 12))
 
 
 @pytest.fixture
@@ -119,18 +119,18 @@ def test_published_figures_are_marked(pool):
     assert all(one.ours_milliseconds is None for one in wc.compare(pool, methods=["photon"], threads=1).published)
 
 
-def test_a_method_that_cannot_is_a_row_with_the_reason(hills):
-    comparison = wc.compare(hills, methods=["photon", "gather"], threads=1)
+def test_a_method_that_cannot_is_a_row_with_the_reason(ramp):
+    comparison = wc.compare(ramp, methods=["photon", "gather"], threads=1)
     refused = [row for row in comparison.rows if row.status == "refused"]
     assert [row.method for row in refused] == ["gather", "gather"]
-    assert all("flat receiver" in row.reason and row.errors is None and row.speed is None for row in refused)
+    assert all("a plane or a terrain" in row.reason and row.errors is None and row.speed is None for row in refused)
     assert not any(row.on_front for row in refused)
     assert comparison.published[0].ours_milliseconds is None
 
 
-def test_methods_that_cannot_and_no_other_are_bad_input(hills):
-    with pytest.raises(wc.InputError, match="flat receiver"):
-        wc.compare(hills, methods=["gather"])
+def test_methods_that_cannot_and_no_other_are_bad_input(ramp):
+    with pytest.raises(wc.InputError, match="a plane or a terrain"):
+        wc.compare(ramp, methods=["gather"])
 
 
 @pytest.mark.parametrize("methods", [["beem"], ["beam", "reference"], []])

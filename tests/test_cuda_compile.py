@@ -10,6 +10,7 @@ import warp as wp
 from warp_caustics.kernels.beam import make_cells, make_corners
 from warp_caustics.kernels.fft import make_fft_rows
 from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
+from warp_caustics.kernels.gather_terrain import make_gather_terrain
 from warp_caustics.kernels.height_field import (
     begin_solve,
     make_drop,
@@ -61,6 +62,7 @@ KERNELS = {
     "torn": lambda: make_torn(EVERYTHING),
     "scatter": lambda: make_scatter(BACKLUND),
     "intersections": lambda: make_intersections(Spec()),
+    "gather_terrain": lambda: make_gather_terrain(EVERYTHING),
     "rows": lambda: make_rows(1),
     "columns": lambda: make_columns(3),
     "resolve": lambda: make_resolve("fixed", 3, 3),

@@ -120,8 +120,9 @@ def test_bundled_scenes_add_up(device, name, method):
     assert np.max(result.energy.over_lit) == 0.0
 
 
-def test_the_gathers_pool_adds_up(device):
-    assert_adds_up(render(bundled("pool"), "gather", device))
+@pytest.mark.parametrize("name", ["pool", "beach", "lake"])
+def test_the_gathers_bundled_scenes_add_up(device, name):
+    assert_adds_up(render(bundled(name), "gather", device))
 
 
 @pytest.mark.parametrize("method", FREE_METHODS)

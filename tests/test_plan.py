@@ -13,14 +13,15 @@ import warp_caustics as wc
 from oracle.cases import sunlight
 from warp_caustics.kernels.beam import make_cells, make_corners
 from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
+from warp_caustics.kernels.gather_terrain import make_gather_terrain
 from warp_caustics.kernels.resolve import make_dry_land, make_resolve
 from warp_caustics.kernels.scatter import make_scatter
 from warp_caustics.kernels.torn import make_torn
 
 KERNEL_OF_PASS = {"waves": "wave_table"}  # where a pass has not its kernel's name
 FACTORIES = (
-    make_cells, make_columns, make_corners, make_dry_land, make_intersections, make_resolve, make_rows, make_scatter,
-    make_torn,
+    make_cells, make_columns, make_corners, make_dry_land, make_gather_terrain, make_intersections, make_resolve,
+    make_rows, make_scatter, make_torn,
 )  # fmt: skip
 KILOBYTE = 1024  # reports of memory are in kilobytes to two digits
 REPORT_ROUNDING = 0.02 * KILOBYTE
@@ -202,6 +203,7 @@ class Watch:
 PLANNED = [
     *((name, method) for name in ("pool", "beach", "tank") for method in FREE_METHODS),
     ("pool", "gather"),
+    ("beach", "gather"),
 ]
 
 

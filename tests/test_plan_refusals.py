@@ -51,10 +51,9 @@ def test_more_water_than_can_be_gone_through_is_refused():
         planned(scene(GENTLE, level=1e6, size=(1e-3, 1e-3)))
 
 
-@pytest.mark.parametrize("kind", ["terrain", "mesh", "objects"])
-def test_the_gather_refuses_what_is_not_flat_and_names_who_takes_it(kind, tmp_path):
+@pytest.mark.parametrize("kind", ["mesh", "objects"])
+def test_the_gather_refuses_meshes_and_names_who_takes_them(kind, tmp_path):
     receiver = {
-        "terrain": {"terrain": {"base": 0.0}},
         "mesh": {"mesh": save_quad(tmp_path)},
         "objects": {"plane": 0.0, "objects": [{"mesh": save_box(tmp_path), "scale": 0.2}]},
     }[kind]
@@ -66,9 +65,16 @@ def test_the_gather_refuses_what_is_not_flat_and_names_who_takes_it(kind, tmp_pa
         planned(scene(GENTLE, receiver), method)
 
 
+def test_a_terrain_so_deep_that_each_pixel_looks_at_the_whole_lake_is_refused_by_the_gather():
+    deep = scene(GENTLE, {"terrain": {"base": 0.0}}, resolution=(512, 512), level=1000.0, size=(4.0, 4.0))
+    with pytest.raises(wc.InputError, match=r"each of 512 x 512 pixels gathers from \d+ x \d+ samples"):
+        planned(deep, "gather")
+
+
+@pytest.mark.parametrize("receiver", [{"plane": 0.0}, {"terrain": {"base": 0.0}}])
 @pytest.mark.parametrize("accumulate", ["float64", "fixed"])
-def test_the_gather_refuses_a_format_it_cannot_honour(accumulate):
-    what = scene(GENTLE, method={"accumulate": accumulate})
+def test_the_gather_refuses_a_format_it_cannot_honour(accumulate, receiver):
+    what = scene(GENTLE, receiver, method={"accumulate": accumulate})
     with pytest.raises(wc.InputError, match=f'accumulate = "{accumulate}"'):
         planned(what, "gather")
     for method in FREE_METHODS:

@@ -106,8 +106,6 @@ def spoiled(renderer, bad):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_height_that_is_no_number_darkens_its_own_pixels(device, method, shore, bad, tmp_path):
     """As a simulation that blows up would leave one behind: its light is dropped, and no other is touched."""
-    if shore and method == "gather":
-        pytest.skip("the gather takes a plane only")
     corner, size = (-1.0, -1.0), (4.0, 4.0)
     x, y = sample_points((96, 96), corner, size)
     heights = save_heights(tmp_path, "swell", sum_of_waves(GENTLE, x, y), corner, size)

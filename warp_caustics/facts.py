@@ -13,7 +13,7 @@ from .simulation.basin import Basin, make_basin
 from .specify import Light, Reason, reasons, specify
 from .sun import MOST_DIRECTIONS, disk_count, disk_directions
 from .water import amplitude_bound, extreme_slopes
-from .window import deviation_bounds, refraction_reach
+from .window import Reach, deviation_bounds, refraction_reach
 
 if TYPE_CHECKING:
     from .assets import Assets
@@ -39,6 +39,7 @@ class Facts:
     irradiance: tuple[float, ...]
     suns: np.ndarray
     rest_shifts: np.ndarray
+    reaches: tuple[Reach, ...]
     rest_depth: float
     amplitude: float
     slope: float
@@ -132,6 +133,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         irradiance=_colour(scene.sun.irradiance, scene.channels),
         suns=suns,
         rest_shifts=shifts,
+        reaches=tuple(reaches),
         rest_depth=depth,
         amplitude=amplitude,
         slope=float(np.linalg.norm(slopes, axis=1).max()),

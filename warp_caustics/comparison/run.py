@@ -140,10 +140,10 @@ def _screen_record(scene: Scene, truth: Truth) -> ScreenRecord | None:
 
 
 def _ours(speed: PublishedSpeed, scene: Scene, device: str, threads: int | None, time: float) -> float | None:
-    """Time our gather at a publication's work [ms]; None where the scene does not allow it."""
+    """Time our gather at a publication's work, two passes over a plane [ms]; None where the scene has none."""
     from warp_caustics.comparison.measure import measure
 
-    if speed.gather is None:
+    if speed.gather is None or scene.receiver.plane is None:
         return None
     columns, rows, n = speed.gather
     same_work = with_settings(scene.at_resolution(columns, rows), "gather", GatherSettings(n=n))

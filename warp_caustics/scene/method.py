@@ -59,13 +59,14 @@ class PhotonSettings(Model):
 
 
 class GatherSettings(Model):
-    """`[method.gather]`: Yuksel & Keyser's two passes."""
+    """`[method.gather]`: Yuksel & Keyser's two passes on a plane; on a terrain one, around each pixel's own centre."""
 
     n: Annotated[int, that(COUNT.read, lambda n: n % 2 == 1, "an odd whole number of at least 1")] | None = Field(
         default=None, description="pixels across the window of samples; from the largest deflection when not given"
     )
     m: Annotated[int, that(COUNT.read, lambda m: m % 2 == 0, "an even whole number of at least 2")] | None = Field(
-        default=None, description="neighbours that the first pass keeps, in m + 1 channels; from n when not given"
+        default=None,
+        description="rows of samples beside a pixel's own; m + 1 channels keep them on a plane; from n when not given",
     )
 
 
