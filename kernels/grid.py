@@ -17,6 +17,8 @@ class Grid:
     nodes: wp.array2d[wp.vec4]
     origin: wp.vec2  # [m]
     per_metre: wp.vec2  # nodes per metre
+    origin_rest: wp.vec2  # what float32 leaves out of the two above: added in float64 they have the host's digits
+    per_metre_rest: wp.vec2
 
 
 @wp.func

@@ -15,6 +15,7 @@ class Lattice:
     first: wp.vec2i  # index of the first cell
     count: wp.vec2i  # cells
     pixel: wp.vec2  # [m]
+    cell_rest: wp.vec2  # what the float32 of step and pixel leave out of a cell's sides [m]
     map: wp.vec2i  # columns and rows of the caustic map
     low: wp.vec2  # where the water begins and ends, metres from the map's origin;
     high: wp.vec2  # beyond the lattice where it has no end
@@ -32,6 +33,19 @@ def on_water(lattice: Lattice, rest: wp.vec2, shift: wp.vec2) -> wp.vec2:
     x = rest[0] * lattice.pixel[0] - shift[0]
     y = rest[1] * lattice.pixel[1] - shift[1]
     return wp.vec2(wp.clamp(x, lattice.low[0], lattice.high[0]), wp.clamp(y, lattice.low[1], lattice.high[1]))
+
+
+@wp.func
+def whole(value: float, rest: float) -> wp.float64:
+    """A float64 that came as a float32 and what that left out."""
+    return wp.float64(value) + wp.float64(rest)
+
+
+@wp.func
+def water_along(lattice: Lattice, axis: int, index: int, offset: float, shift: wp.vec2) -> wp.float64:
+    """As :func:`on_water`, along one axis, of a lattice point of water without a border, in float64."""
+    side = wp.float64(lattice.step) * wp.float64(lattice.pixel[axis]) + wp.float64(lattice.cell_rest[axis])
+    return (wp.float64(index) + wp.float64(offset)) * side - wp.float64(shift[axis])
 
 
 @wp.func

@@ -10,9 +10,10 @@ class Spec:
     Attributes
     ----------
     water : str
-        ``"waves"`` (a sum of sines), ``"grid"`` (a height map) or ``"periodic"`` (one that repeats without end).
+        ``"waves"`` (a sum of sines), ``"grid"`` (a height map), ``"periodic"`` (one that repeats without end) or
+        ``"radial"`` (rings around a point).
     declared : bool
-        The bounds of the water are declared, not known, as of a simulation: light that is past them is dropped.
+        The bounds of the water are declared or sampled, as of a simulation or a sea: light past them is dropped.
     receiver : str
         ``"plane"``, ``"waves"`` (terrain in closed form), ``"grid"`` (terrain from a file) or ``"mesh"``.
     objects : bool

@@ -1,9 +1,10 @@
 """Water as a sum of its modes: each turned by its own frequency to any time, exactly; then Fourier transforms.
 
-In water that starts at rest a mode stands, ``h(k, t) = h(k, 0) cos(w t)``, so that no step is taken and none can be
-unstable. Periodic water is a sum of ``exp(i k x)`` with whole waves in its rectangle; water between walls a sum of
-``cos(kx x) cos(ky y)`` with half waves, which is the real part of a transform of twice the length, its upper half
-zero: ``sum_k c_k cos(pi k (n + 1/2) / N) = Re sum_k (c_k e^(i pi k / 2N)) e^(2 pi i k n / 2N)``.
+In water that starts at rest a mode stands, ``h(k, t) = h(k, 0) cos(w t)``; in a sea it travels,
+``h(k, t) = h(k, 0) exp(-i w t)``. No step is taken, and none can be unstable. Periodic water is a sum of
+``exp(i k x)`` with whole waves in its rectangle; water between walls a sum of ``cos(kx x) cos(ky y)`` with half waves,
+which is the real part of a transform of twice the length, its upper half zero:
+``sum_k c_k cos(pi k (n + 1/2) / N) = Re sum_k (c_k e^(i pi k / 2N)) e^(2 pi i k n / 2N)``.
 """
 
 import functools
@@ -18,6 +19,7 @@ class Dispersion:
     gravity: wp.float64  # [m/s^2]
     tension: wp.float64  # surface tension by density [m^3/s^2]
     depth: wp.float64  # [m]
+    unit: wp.float64  # of which frequencies of a sea that loops are whole multiples [rad/s]
 
 
 @wp.func
@@ -63,6 +65,41 @@ def make_evolve(mirrored: bool) -> wp.Kernel:
         modes_out[row, column] = value
 
     return evolve
+
+
+@functools.cache
+def make_travel(looped: bool) -> wp.Kernel:
+    """Take each mode of a sea to a time, by a frequency that is a whole multiple of one where it loops.
+
+    One thread a value of ``modes_out``. A mode and its opposite are waves that run each its own way: the surface is the
+    real part of their sum.
+    """
+
+    @wp.kernel(enable_backward=False, module="unique")
+    def travel(
+        # In:
+        spectrum: wp.array2d[wp.vec2d],
+        wavenumbers: wp.vec2d,
+        dispersion: Dispersion,
+        time: wp.float64,
+        # Out:
+        modes_out: wp.array2d[wp.vec2d],
+    ):
+        row, column = wp.tid()
+        wavevector = wp.vec2d(
+            mode_number(column, spectrum.shape[1], False) * wavenumbers[0],
+            mode_number(row, spectrum.shape[0], False) * wavenumbers[1],
+        )
+        frequency = angular_frequency(dispersion, wavevector)
+        if wp.static(looped):
+            turns = wp.max(wp.round(frequency / dispersion.unit), wp.float64(1.0))
+            frequency = turns * dispersion.unit
+        c = wp.cos(frequency * time)
+        s = wp.sin(frequency * time)
+        mode = spectrum[row, column]
+        modes_out[row, column] = wp.vec2d(mode[0] * c + mode[1] * s, mode[1] * c - mode[0] * s)
+
+    return travel
 
 
 @functools.cache

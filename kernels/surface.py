@@ -1,8 +1,9 @@
-"""Surfaces: water and terrain as one thing, a plane that carries waves or a height map."""
+"""Surfaces: water and terrain as one thing, a plane that carries waves, a height map, or rings."""
 
 import warp as wp
 
 from .grid import Grid, grid_place, grid_sum, grid_sum_curved, periodic_place
+from .radial import ring_sum, ring_sum_curved
 from .waves import Wave, vec6, wave_sum, wave_sum_curved
 
 
@@ -14,6 +15,7 @@ class Surface:
     slope: wp.vec2
     waves: wp.array[Wave]
     grid: Grid
+    middle: wp.vec2  # of rings, whose wave is the first
 
 
 @wp.func
@@ -57,8 +59,25 @@ def periodic_curved_at(surface: Surface, x: float, y: float) -> vec6:
     return grid_sum_curved(surface.grid, periodic_place(surface.grid, x, y))
 
 
-HEIGHT_AND_SLOPE = {"waves": waves_at, "grid": grid_at, "periodic": periodic_at}
+@wp.func
+def radial_at(surface: Surface, x: float, y: float) -> wp.vec3:
+    """Height and slope (z, z_x, z_y) of rings."""
+    return ring_sum(surface.waves[0], x - surface.middle[0], y - surface.middle[1])
+
+
+@wp.func
+def radial_curved_at(surface: Surface, x: float, y: float) -> vec6:
+    """As :func:`radial_at`, with the second derivatives."""
+    return ring_sum_curved(surface.waves[0], x - surface.middle[0], y - surface.middle[1])
+
+
+HEIGHT_AND_SLOPE = {"waves": waves_at, "grid": grid_at, "periodic": periodic_at, "radial": radial_at}
 """By kind of surface: (z, z_x, z_y) at a point."""
 
-HEIGHT_SLOPE_AND_CURVATURE = {"waves": waves_curved_at, "grid": grid_curved_at, "periodic": periodic_curved_at}
+HEIGHT_SLOPE_AND_CURVATURE = {
+    "waves": waves_curved_at,
+    "grid": grid_curved_at,
+    "periodic": periodic_curved_at,
+    "radial": radial_curved_at,
+}
 """By kind of surface: (z, z_x, z_y, z_xx, z_xy, z_yy) at a point."""

@@ -1,16 +1,18 @@
 """Waves on a lattice: sines of sums from sines of the parts, tabulated once for each row and each column.
 
 sin(A + B) = sin A cos B + cos A sin B, with A from the column and B from the row: a lattice point costs four products
-a wave and no sine. The tables are made in float64: on a lattice of thousands of radians the sines
-have all the digits that the float32 wavevector allows.
+a wave and no sine. The tables are made in float64, of wavevectors, phases and cells with the host's digits: on a
+lattice of thousands of radians the sines are right to their last digit, and water that repeats repeats bit for bit.
 """
 
 import functools
 
 import warp as wp
 
-from .lattice import Lattice
+from .grid import grid_sum
+from .lattice import Lattice, water_along, whole
 from .photon import Scene, SunSample
+from .place_table import tabled_place
 from .spec import Spec
 from .surface import HEIGHT_AND_SLOPE
 from .waves import Wave
@@ -41,17 +43,15 @@ def wave_table(
     """
     i = wp.tid()
     shift = suns[sun].rest_shift
-    step = wp.float64(lattice.step)
     for w in range(scene.water.surface.waves.shape[0]):
         wave = scene.water.surface.waves[w]
         if i < column_waves_out.shape[0]:
-            cell = wp.float64(lattice.first[0] + i) + wp.float64(offset)
-            x = cell * step * wp.float64(lattice.pixel[0]) - wp.float64(shift[0])
-            column_waves_out[i, w] = turn(wp.float64(wave.wavevector[0]) * x + wp.float64(wave.phase))
+            x = water_along(lattice, 0, lattice.first[0] + i, offset, shift)
+            phase = whole(wave.phase, wave.phase_rest)
+            column_waves_out[i, w] = turn(whole(wave.wavevector[0], wave.wavevector_rest[0]) * x + phase)
         if i < row_waves_out.shape[0]:
-            cell = wp.float64(first_row + i) + wp.float64(offset)
-            y = cell * step * wp.float64(lattice.pixel[1]) - wp.float64(shift[1])
-            row_waves_out[i, w] = turn(wp.float64(wave.wavevector[1]) * y)
+            y = water_along(lattice, 1, first_row + i, offset, shift)
+            row_waves_out[i, w] = turn(whole(wave.wavevector[1], wave.wavevector_rest[1]) * y)
 
 
 @wp.func
@@ -73,9 +73,9 @@ def wave_lattice_sum(
 
 @functools.cache
 def make_water_on_lattice(spec: Spec) -> wp.Function:
-    """Height and slope of the water at a lattice point: from the tables of its waves, or from its height map."""
+    """Height and slope of the water at a lattice point: from the tables of its waves or places, or from its kind."""
     water_at = HEIGHT_AND_SLOPE[spec.water]
-    tabled = spec.water == "waves"
+    tabled, periodic = spec.water == "waves", spec.water == "periodic"
 
     @wp.func
     def water_on_lattice(
@@ -84,6 +84,9 @@ def make_water_on_lattice(spec: Spec) -> wp.Function:
     ) -> wp.vec3:  # fmt: skip
         if wp.static(tabled):
             return wave_lattice_sum(scene.water.surface.waves, column_waves, row_waves, column, row)
+        elif wp.static(periodic):
+            grid = scene.water.surface.grid
+            return grid_sum(grid, tabled_place(grid, column_waves, row_waves, column, row))
         else:
             return water_at(scene.water.surface, at[0], at[1])
 

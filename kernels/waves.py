@@ -12,6 +12,8 @@ class Wave:
     amplitude: float  # [m]
     wavevector: wp.vec2  # [rad/m]
     phase: float  # [rad]
+    wavevector_rest: wp.vec2  # what float32 leaves out of the two above: added in float64 they have
+    phase_rest: float  # the host's digits, which tables need where light comes from many wavelengths away
 
 
 @wp.func

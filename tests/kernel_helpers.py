@@ -11,6 +11,7 @@ from warp_caustics.kernels.lattice import Lattice
 from warp_caustics.kernels.project import Receiver
 from warp_caustics.kernels.surface import Surface
 from warp_caustics.kernels.waves import Wave
+from warp_caustics.state import split
 
 ENDLESS = 1e30  # where water without a border ends
 
@@ -30,7 +31,8 @@ def wave_array(waves, device):
     """Sines (amplitude, (kx, ky), phase) as the kernels hold them."""
     table = np.zeros(len(waves), dtype=Wave.numpy_dtype())
     for i, (amplitude, wavevector, phase) in enumerate(waves):
-        table[i] = (amplitude, wavevector, phase)
+        (k, k_rest), (turn, turn_rest) = split(wavevector), split(phase)
+        table[i] = (amplitude, k, turn, k_rest, turn_rest)
     return wp.array(table, dtype=Wave, device=device)
 
 
@@ -77,5 +79,6 @@ def lattice(first, count, step=1.0, pixel=(1.0, 1.0), resolution=(8, 8)):
     made.step = step
     made.first, made.count = wp.vec2i(*first), wp.vec2i(*count)
     made.pixel, made.map = wp.vec2(*pixel), wp.vec2i(*resolution)
+    made.cell_rest = wp.vec2(*(step * np.asarray(pixel, dtype=np.float64) - split(step)[0] * split(pixel)[0]))
     made.low, made.high = wp.vec2(-ENDLESS, -ENDLESS), wp.vec2(ENDLESS, ENDLESS)
     return made

@@ -44,13 +44,20 @@ def scene(
     level: float = 1.0,
     height_map: dict[str, Any] | None = None,
     simulation: dict[str, Any] | None = None,
+    spectrum: dict[str, Any] | None = None,
+    preset: str | None = None,
     self_shadow: str | bool = "auto",
     sun: dict[str, Any] | None = None,
     method: dict[str, Any] | None = None,
     camera: dict[str, Any] | None = None,
 ) -> wc.Scene:
     """Make a scene of one metre of water over a flat floor at z = 0, with pixels that are not square."""
-    kinds: dict[str, Any] = {"height_map": height_map, "simulation": simulation}
+    kinds: dict[str, Any] = {
+        "height_map": height_map,
+        "simulation": simulation,
+        "spectrum": spectrum,
+        "preset": preset,
+    }
     water = {name: given for name, given in kinds.items() if given is not None} or {"waves": list(waves)}
     return wc.Scene(
         water={"level": level, "self_shadow": self_shadow, **water},

@@ -220,7 +220,7 @@ BAD_SCENES = {
     "a map without a size": ("size = [1.0, 1.0]", "size = [0.0, 1.0]", ["map.size"]),
     "a map without pixels": ("[16, 16]", "[0, 16]", ["map.resolution"]),
     "a map that does not fit": ("[16, 16]", "[100000, 100000]", ["bytes", "100000"]),
-    "water to come": (HEIGHT_MAP, 'preset = "ripples"', ["water.preset", "not yet"]),
+    "a preset of nobody": (HEIGHT_MAP, 'preset = "tsunami"', ["water.preset", '"ripples"']),
     "a height map that is missing": (
         HEIGHT_MAP,
         'height_map = { file = "no.npy", origin = [0, 0], size = [1, 1] }',

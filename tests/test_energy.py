@@ -253,7 +253,7 @@ def test_everything_at_once_adds_up(device, method, tmp_path):
     )
     result = render(what, method, device)
     left_out = {reason.what for reason in result.plan.reasons if not reason.kept}
-    assert left_out == {"camera", "simulation"}  # a file has no simulation
+    assert left_out == {"camera", "simulation", "spectrum"}  # a file is neither
     assert_adds_up(result)
     assert np.isfinite(result.caustic_map).all()
     for name in ("received", "reflected", "absorbed", "blocked", "dry"):

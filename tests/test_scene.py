@@ -141,7 +141,10 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
 @pytest.mark.parametrize(
     ("tables", "fault"),
     [
-        ({"water": {"level": 1.0}}, "water: expected exactly one of waves, height_map or simulation, got none"),
+        (
+            {"water": {"level": 1.0}},
+            "water: expected exactly one of waves, preset, height_map, simulation or spectrum, got none",
+        ),
         ({"water": 3}, "water: expected a table, got 3"),
         ({"water": {"level": 1.0, "waves": 3}}, "water.waves: expected a list of tables, got 3"),
         ({"water": {"level": 1.0, "waves": [3]}}, "water.waves[0]: expected a table, got 3"),
@@ -150,12 +153,12 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
             'water.self_shadow: expected "auto", true or false, got "atuo": did you mean "auto"?',
         ),
         (
-            {"water": {"level": 1.0, "spectrum": {"kind": "jonswap"}}},
-            "water.spectrum: not yet in this version, use waves or height_map",
+            {"water": {"level": 1.0, "preset": "ripple"}},
+            'water.preset: expected one of "ripples", "waves" or "radial", got "ripple": did you mean "ripples"?',
         ),
         (
-            {"water": {"level": 1.0, "preset": "ripples"}},
-            "water.preset: not yet in this version, use waves or height_map",
+            {"water": {"level": 1.0, "preset": "ripples", "waves": []}},
+            "water: expected exactly one of waves, preset, height_map, simulation or spectrum, got waves and preset",
         ),
         (
             {"water": {"level": 10**5000, "waves": []}},

@@ -44,7 +44,7 @@ def written(folder: Path, text: str | bytes, name: str = "own.toml") -> Path:
 
 
 def test_the_bundled_scenes_load_under_their_names() -> None:
-    assert bundled_scenes() == ["beach", "lake", "pool", "tank"]
+    assert bundled_scenes() == ["beach", "lake", "pool", "sea", "tank"]
     for name in bundled_scenes():
         scene = load_scene(name)
         assert scene.name == name
@@ -132,8 +132,8 @@ def test_a_file_that_is_no_scene_is_refused_in_one_message(tmp_path: Path, conte
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("nosuch.toml", "nosuch.toml: no such scene file (bundled scenes: beach, lake, pool and tank)"),
-        ("pol", 'pol: no such scene file, did you mean "pool"? (bundled scenes: beach, lake, pool and tank)'),
+        ("nosuch.toml", "nosuch.toml: no such scene file (bundled scenes: beach, lake, pool, sea and tank)"),
+        ("pol", 'pol: no such scene file, did you mean "pool"? (bundled scenes: beach, lake, pool, sea and tank)'),
         ("folder", "folder: expected a scene file, got a folder"),
     ],
 )

@@ -94,7 +94,7 @@ def test_stages_lanes_and_fills_run_in_order(device, method):
         assert np.allclose(frame.caustic_map.numpy(), 1.0 + 2.0 * (time + 10.0))
     result = renderer.result()
     assert result.energy is None and result.screen_map is None and result.warnings == list(renderer.plan.warnings)
-    assert renderer.plan.launches == 3 and renderer.plan.kernels == ("add",) and renderer._state is None
+    assert renderer.plan.launches == 3 and renderer.plan.kernels == ("add",) and renderer._states == []
     assert "add" in str(renderer.plan) and renderer.plan.samples == result.caustic_map.size
 
 

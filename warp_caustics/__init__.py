@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from warp_caustics.renderer import Renderer, render
     from warp_caustics.result import Result
     from warp_caustics.scene import Scene, bundled_scenes, load_scene
+    from warp_caustics.texture import Texture, make_texture
 
 __version__ = "0.1.0"
 
@@ -31,6 +32,7 @@ __all__ = [
     "Renderer",
     "Result",
     "Scene",
+    "Texture",
     "WarpCausticsError",
     "__version__",
     "bundled_scenes",
@@ -39,6 +41,7 @@ __all__ = [
     "load_scene",
     "make_plan",
     "make_reference",
+    "make_texture",
     "render",
 ]
 
@@ -50,12 +53,14 @@ _HOMES = {
     "Renderer": "renderer",
     "Result": "result",
     "Scene": "scene",
+    "Texture": "texture",
     "bundled_scenes": "scene",
     "compare": "comparison",
     "load_map": "exr",
     "load_scene": "scene",
     "make_plan": "plan",
     "make_reference": "reference",
+    "make_texture": "texture",
     "render": "renderer",
 }
 

@@ -51,6 +51,7 @@ def write_map(
     time: float,
     origin: Sequence[float] | None = None,
     size: Sequence[float] | None = None,
+    marks: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a map as EXR, whole or not at all; `load_map` gives it back bit for bit.
 
@@ -74,6 +75,8 @@ def write_map(
         Time of the frame [s].
     origin, size
         Lower corner and extent of the map, (x, y) [m]; left out of what a camera sees.
+    marks
+        Further attributes by name: texts, numbers, or tuples of two or three.
 
     Raises
     ------
@@ -97,6 +100,7 @@ def write_map(
         "method": method,
         "time": _as_attribute(time),
         **{ENERGY_PREFIX + name: _as_attribute(value) for name, value in energy.items()},
+        **{name: mark if isinstance(mark, str) else _as_attribute(mark) for name, mark in (marks or {}).items()},
     }
     # Into memory first: the binding swallows Ctrl-C, and a full disk becomes a text; Python's own file does neither.
     encoded = io.BytesIO()

@@ -10,6 +10,7 @@ import numpy as np
 from .kernels.spec import Spec
 from .receiver import SHALLOWEST, Bounds, check_covered, receiver_bounds, receiver_kind, rest_depth
 from .simulation.basin import Basin, make_basin
+from .simulation.sea import Sea, make_sea
 from .specify import Light, Reason, reasons, specify
 from .sun import MOST_DIRECTIONS, disk_count, disk_directions
 from .water import amplitude_bound, extreme_slopes
@@ -26,7 +27,7 @@ SPARE_WAY = 4.0
 
 @dataclass(frozen=True)
 class Facts:
-    """All that a plan needs to know of a scene.
+    """All that a plan needs to know of a scene; ``basin`` is water that is made before each frame.
 
     Heights are relative to the water's level, positions to the map's origin, in metres and float64.
     """
@@ -49,7 +50,7 @@ class Facts:
     backlund_deviation: tuple[np.ndarray, np.ndarray]
     longest_way: float
     reasons: tuple[Reason, ...]
-    basin: Basin | None = None
+    basin: Basin | Sea | None = None
     warnings: tuple[str, ...] = field(default=())
 
     @property
@@ -76,7 +77,7 @@ class Facts:
     @property
     def waves(self) -> int:
         """Count of the water's waves."""
-        return len(self.scene.water.waves or ())
+        return len(self.scene.waves)
 
 
 def gather_facts(scene: Scene, assets: Assets) -> Facts:
@@ -85,7 +86,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     Raises
     ------
     InputError
-        If the map reaches past the terrain, or the water's simulation cannot be had.
+        If the map reaches past the terrain, or the water's simulation or spectrum cannot be had.
     """
     check_covered(scene, assets)
     ior, warnings = scene.medium.green_ior, []
@@ -112,7 +113,10 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
     anywhere = (0.0, max(0.0, -wide.lowest) + amplitude)
     by_backlund = _deviation([((r.backlund_low, r.backlund_high), r.rest) for r in reaches], anywhere, reference, pixel)
     shifts = np.array([reference * reach.rest for reach in reaches])
-    basin = None
+    basin: Basin | Sea | None = None
+    if scene.water.spectrum is not None:
+        basin = make_sea(scene.water.spectrum, depth)
+        warnings += basin.warnings
     if scene.water.simulation is not None:
         low, high = np.asarray(scene.map.origin) - shifts.max(axis=0), np.asarray(scene.map.origin) - shifts.min(axis=0)
         low, high = low - deviation[1] * pixel, high + scene.map.size - deviation[0] * pixel
@@ -142,7 +146,7 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         deviation=deviation,
         backlund_deviation=by_backlund,
         longest_way=float(max(amplitude - wide.lowest, SHALLOWEST) * np.hypot(1.0, steepest)),
-        reasons=reasons(scene, spec, len(suns)),
+        reasons=reasons(scene, spec, len(suns), basin),
         basin=basin,
         warnings=tuple(warnings),
     )

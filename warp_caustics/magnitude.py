@@ -17,7 +17,20 @@ LARGEST, SMALLEST = 1e18, 1e-18
 """Sizes whose squares float32 still holds."""
 
 DIVISORS = frozenset(
-    {"size", "cell", "step", "density", "radius", "samples_per_pixel", "photons_per_pixel", "footprint"}
+    {
+        "size",
+        "cell",
+        "step",
+        "density",
+        "radius",
+        "samples_per_pixel",
+        "photons_per_pixel",
+        "footprint",
+        "period",
+        "wind_speed",
+        "fetch",
+        "loop",
+    }
 )
 """Keys by whose values something is divided: they must not be too small either."""
 

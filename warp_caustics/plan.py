@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from .reference.plan import ReferencePlan
 
-WAVE_BYTES, SUN_BYTES = 16, 20
+WAVE_BYTES, SUN_BYTES = 28, 20
 """Bytes of a wave and of a direction of the sun on the device."""
 
 MOST_VALUES = 2**31 - 1
@@ -244,9 +244,8 @@ def _too_large(plan: Plan, free: int) -> str:
     if basin is not None:
         water = sum(buffer.bytes for buffer in simulation_buffers(basin))
         if 2 * water > plan.bytes:
-            key = "resolution" if basin.settings.cell is None else "cell"
             return (
-                f"water.simulation.{key}: {basin.columns} x {basin.rows} cells take {water:,} bytes of {plan.bytes:,}, "
+                f"{basin.fineness}: {basin.columns} x {basin.rows} cells take {water:,} bytes of {plan.bytes:,}, "
                 f"{room}expected fewer cells"
             )
     return (
@@ -295,8 +294,8 @@ def check_work(facts: Facts, program: Program | Sequence) -> None:
 
 def _buffers(facts: Facts, program: Program | Sequence) -> tuple[Buffer, ...]:
     buffers = [*program.own_buffers(facts), Buffer("suns", "SunSample", (len(facts.suns),), SUN_BYTES)]
-    if facts.scene.water.waves:
-        buffers.append(Buffer("waves", "Wave", (len(facts.scene.water.waves),), WAVE_BYTES))
+    if facts.waves:
+        buffers.append(Buffer("waves", "Wave", (facts.waves,), WAVE_BYTES))
     for name, grid in (("water_nodes", facts.assets.water), ("terrain_nodes", facts.assets.terrain)):
         if grid is not None:
             buffers.append(Buffer(name, "vec4", grid.z.shape, 16))

@@ -106,7 +106,7 @@ def write_picture(
     path
         The PNG file to write, in a folder that exists.
     pixels
-        uint8 sRGB [rows, columns, 3], row 0 at the bottom.
+        uint8 sRGB [rows, columns, 3], or grey [rows, columns], row 0 at the bottom.
     metadata
         Texts to keep in the file, by name.
     """

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from .kernels.ledger import BINS, ENTRIES
+from .kernels.place_table import place_table
 from .kernels.wave_table import wave_table
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ class Pass:
 
 
 def wave_pass(spec: Spec, lattice: Lattice, waves: int, rows: int, border: int, offset: float) -> WavePass:
-    """Plan the tables of a lattice's waves, or nothing where the water is a height map.
+    """Plan the tables of a lattice's waves, or of its places in water that repeats; nothing for other water.
 
     Parameters
     ----------
@@ -109,12 +110,15 @@ def wave_pass(spec: Spec, lattice: Lattice, waves: int, rows: int, border: int, 
     offset : float
         Of the first point from the first cell's corner [cells].
     """
-    if spec.water != "waves":
+    if spec.water not in ("waves", "periodic"):
         return WavePass((), (), {})
     columns = lattice.count[0] + border
+    if spec.water == "waves":
+        name, does, kernel = "waves", "sines of each row and column of points", wave_table
+    else:
+        name, does, kernel, waves = "places", "nodes beside each row and column of points", place_table, 1
     return WavePass(
-        (Pass("waves", "sines of each row and column of points", lambda: wave_table,
-              lambda strip: (max(columns, strip + border),)),),
+        (Pass(name, does, lambda: kernel, lambda strip: (max(columns, strip + border),)),),
         (Buffer("column_waves", "vec2", (columns, waves), 8, per_lane=True),
          Buffer("row_waves", "vec2", (rows + border, waves), 8, per_lane=True)),
         {"offset": offset},

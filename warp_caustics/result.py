@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from .receiver import receiver_kind, receiver_slopes
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping
 
     from .assets import Assets
     from .dispersion import DispersedPlan
@@ -137,7 +138,12 @@ class Result:
             )
         return notes
 
-    def save(self, path: str | os.PathLike[str], limits: tuple[float, float] | None = None) -> Path:
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        limits: tuple[float, float] | None = None,
+        marks: Mapping[str, Any] | None = None,
+    ) -> Path:
         """Write the map as EXR, or as a PNG picture, by the file's ending; whole, or not at all.
 
         A screen-space method's is what the camera sees: its PNG has the camera's pixels and nothing beside them.
@@ -149,6 +155,8 @@ class Result:
         limits
             Values of black and white in a PNG, in the map's own units; each picture has its own if not given, which
             would flicker in a sequence (:func:`warp_caustics.tone.value_limits` of its first frame does not).
+        marks
+            Further attributes of an EXR, by name.
 
         Raises
         ------
@@ -168,6 +176,7 @@ class Result:
                 path, image, scene_text=scene.to_toml(), version=__version__, method=self.method,
                 units=UNITS, energy=self.energy or {}, time=self.time,
                 origin=scene.map.origin if in_plan else None, size=scene.map.size if in_plan else None,
+                marks=marks,
             )  # fmt: skip
         elif path.suffix.lower() != ".png":
             raise InputError(f"{path}: expected a file that ends in .exr or .png")

@@ -16,6 +16,10 @@ from .receiver import Bounds, receiver_kind
 if TYPE_CHECKING:
     from .assets import Assets
     from .scene import Scene
+    from .simulation import Basin, Sea
+
+WATER_IN_WORDS = {"waves": "a sum of waves", "grid": "a file", "radial": "rings around a point"}
+"""Kinds of water that are not made before each frame."""
 
 HEIGHT_FIELDS = ("waves", "grid")
 """Kinds of receiver that have one height at a point, and are marched over."""
@@ -53,7 +57,11 @@ class Light:
 
 
 def water_kind(scene: Scene, assets: Assets) -> str:
-    """``"waves"``, ``"grid"`` (a height map, from a file or a simulation) or ``"periodic"`` (one that repeats)."""
+    """Kind of the water: ``"waves"``, ``"grid"`` (a height map), ``"periodic"`` (one that repeats) or ``"radial"``."""
+    if scene.water.preset == "radial":
+        return "radial"
+    if scene.water.spectrum is not None:
+        return "periodic"
     if scene.water.simulation is not None:
         return "periodic" if scene.water.simulation.border == "periodic" else "grid"
     return "waves" if assets.water is None else "grid"
@@ -73,7 +81,7 @@ def specify(scene: Scene, assets: Assets, light: Light, ground: Bounds) -> Spec:
     absorbs = by_depth or bool(np.any(medium.absorption))
     return Spec(
         water=water_kind(scene, assets),
-        declared=scene.water.simulation is not None,
+        declared=scene.water.simulation is not None or scene.water.spectrum is not None,
         receiver=kind,
         objects=assets.objects is not None,
         bounded=water_kind(scene, assets) == "grid",
@@ -91,16 +99,18 @@ def specify(scene: Scene, assets: Assets, light: Light, ground: Bounds) -> Spec:
     )
 
 
-def reasons(scene: Scene, spec: Spec, suns: int) -> tuple[Reason, ...]:
+def reasons(scene: Scene, spec: Spec, suns: int, basin: Basin | Sea | None) -> tuple[Reason, ...]:
     """Say of each thing that a scene could need whether it does, and why."""
     height_field, meshes = spec.receiver in HEIGHT_FIELDS, spec.objects or spec.receiver == "mesh"
     unshaded = "water.self_shadow is false" if spec.faces_away else "no slope reaches the sun's elevation"
-    simulation = scene.water.simulation
-    water = f"water is {'simulated' if simulation else 'a file' if spec.water == 'grid' else 'a sum of waves'}"
-    simulated = f"{simulation.kind}, {simulation.border}" if simulation else ""
+    simulation, spectrum = scene.water.simulation, scene.water.spectrum
+    made = "simulated" if simulation else "a sea" if spectrum else WATER_IN_WORDS[spec.water]
+    water = f"water is {made}"
+    summary = "" if basin is None else basin.summary
     table = (
-        ("surface by height map", spec.water != "waves", water, water),
-        ("simulation", simulation is not None, simulated, water),
+        ("surface by height map", spec.water in ("grid", "periodic"), water, water),
+        ("simulation", simulation is not None, summary, water),
+        ("spectrum", spectrum is not None, summary, water),
         ("border of the water", spec.bounded, "cells are clipped to it", "the water has no end"),
         ("Fresnel", spec.fresnel, "medium.fresnel", "medium.fresnel is false"),
         ("attenuation", spec.attenuation != "none", f"by {spec.attenuation}", "nothing absorbs: no path length"),

@@ -15,12 +15,14 @@ from .kernels.surface import Surface
 from .kernels.waves import Wave
 from .receiver import closed_terrain
 from .simulation import SimulatedWater
-from .water import phases
+from .water import is_radial, phases
 
 if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
     from .assets import HeightGrid, TriangleMesh
     from .facts import Facts
-    from .simulation import Basin
+    from .simulation import Basin, Sea
     from .window import Lattice as HostLattice
 
 PIXELS_A_STEP = 0.25
@@ -33,6 +35,13 @@ ENDLESS = 1.0e30
 """Where water without a border ends."""
 
 
+def split(values: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
+    """Round to float32, and what that leaves out: two numbers that kernels can add up to 48 bits. Both as float64."""
+    whole = np.asarray(values, dtype=np.float64)
+    rounded = whole.astype(np.float32).astype(np.float64)
+    return rounded, whole - rounded
+
+
 class SceneState:
     """Structs and arrays on a device; owns what they point to.
 
@@ -43,7 +52,7 @@ class SceneState:
     suns : wp.array
         Directions of the sun, written by :meth:`write`.
     simulated : SimulatedWater or None
-        Water that is simulated.
+        Water that is simulated, or a sea.
     """
 
     def __init__(self, facts: Facts, device: str) -> None:
@@ -51,7 +60,7 @@ class SceneState:
         self._keep: list[Any] = []
         # The host side is pinned, so that a copy can be part of a captured frame.
         pinned = device != "cpu"
-        count = len(facts.scene.water.waves or ())
+        count = facts.waves
         self._host_waves = wp.zeros(count, dtype=Wave, device="cpu", pinned=pinned)
         self._host_suns = wp.zeros(len(facts.suns), dtype=SunSample, device="cpu", pinned=pinned)
         self._waves = wp.empty(count, dtype=Wave, device=device)
@@ -65,7 +74,8 @@ class SceneState:
         if self.simulated is not None:
             self.simulated.advance(time)
         if len(self._host_waves):
-            self._host_waves.numpy()["phase"] = phases(self._facts.scene, time, self._facts.rest_depth)
+            waves = self._host_waves.numpy()
+            waves["phase"], waves["phase_rest"] = split(phases(self._facts.scene, time, self._facts.rest_depth))
             wp.copy(self._waves, self._host_waves)
         wp.copy(self.suns, self._host_suns)
 
@@ -76,6 +86,7 @@ class SceneState:
         made.first = wp.vec2i(*lattice.first)
         made.count = wp.vec2i(*lattice.count)
         made.pixel = wp.vec2(*facts.pixel)
+        made.cell_rest = wp.vec2(*(lattice.step * facts.pixel - split(lattice.step)[0] * split(facts.pixel)[0]))
         made.map = wp.vec2i(*facts.scene.map.resolution)
         low, high = np.full(2, -ENDLESS), np.full(2, ENDLESS)
         if facts.water_border is not None:
@@ -87,9 +98,9 @@ class SceneState:
         suns, waves = self._host_suns.numpy(), self._host_waves.numpy()
         suns["direction"] = self._facts.suns
         suns["rest_shift"] = self._facts.rest_shifts
-        for i, wave in enumerate(self._facts.scene.water.waves or ()):
+        for i, wave in enumerate(self._facts.scene.waves):
             waves["amplitude"][i] = wave.amplitude
-            waves["wavevector"][i] = wave.wavevector
+            waves["wavevector"][i], waves["wavevector_rest"][i] = split(wave.wavevector)
 
     def _make_scene(self) -> Scene:
         facts, scene = self._facts, Scene()
@@ -97,6 +108,8 @@ class SceneState:
         scene.water.surface = self._surface(facts.assets.water, self._waves)
         if self.simulated is not None:
             scene.water.surface.grid = self._simulated_grid(self.simulated)
+        if is_radial(facts.scene):
+            scene.water.surface.middle = wp.vec2(*(0.5 * side for side in facts.scene.map.size))
         scene.water.amplitude = facts.amplitude
         scene.water.slope = facts.slope
         scene.water.step = step
@@ -127,7 +140,7 @@ class SceneState:
         table = np.zeros(len(terrain.waves), dtype=Wave.numpy_dtype())
         for i, wave in enumerate(terrain.waves):
             turn = np.mod(wave.phase + np.dot(wave.wavevector, origin), 2.0 * np.pi)
-            table[i] = (wave.amplitude, wave.wavevector, turn)
+            table[i] = (wave.amplitude, wave.wavevector, turn, (0.0, 0.0), 0.0)  # no table is made of it
         waves: wp.array = wp.array(table, dtype=Wave, device=self._device)
         self._keep.append(waves)
         surface = self._surface(None, waves)
@@ -146,12 +159,13 @@ class SceneState:
             self._keep.append(surface.grid.nodes)
         return surface
 
-    def _grid(self, nodes: wp.array, placed: HeightGrid | Basin) -> Grid:
+    def _grid(self, nodes: wp.array, placed: HeightGrid | Basin | Sea) -> Grid:
         """The kernels' form of nodes at the middles of cells."""
         made, cell = Grid(), np.asarray(placed.cell)
         made.nodes = nodes
-        made.origin = wp.vec2(*(np.subtract(placed.origin, self._facts.scene.map.origin) + 0.5 * cell))
-        made.per_metre = wp.vec2(*(1.0 / cell))
+        _put_origin(made, np.subtract(placed.origin, self._facts.scene.map.origin) + 0.5 * cell)
+        per_metre, rest = split(1.0 / cell)
+        made.per_metre, made.per_metre_rest = wp.vec2(*per_metre), wp.vec2(*rest)
         return made
 
     def _simulated_grid(self, water: SimulatedWater) -> Grid:
@@ -161,7 +175,7 @@ class SceneState:
         if basin.periodic:
             low = low - np.asarray(basin.size) * np.round(low / basin.size)
         made, cell = self._grid(water.nodes, basin), np.asarray(basin.cell)
-        made.origin = wp.vec2(*(low + (0.5 - water.ring) * cell))
+        _put_origin(made, low + (0.5 - water.ring) * cell)
         return made
 
     def _mesh(self, mesh: TriangleMesh | None) -> Any:
@@ -175,3 +189,8 @@ class SceneState:
         )
         self._keep.append(made)
         return made.id
+
+
+def _put_origin(grid: Grid, origin: np.ndarray) -> None:
+    whole, rest = split(origin)
+    grid.origin, grid.origin_rest = wp.vec2(*whole), wp.vec2(*rest)

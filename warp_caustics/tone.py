@@ -119,11 +119,37 @@ def to_rgb8(image: npt.NDArray[np.floating[Any]], limits: tuple[float, float]) -
     values = np.where(finite, image, 0.0)
     if colour:
         finite = finite.all(axis=2)
-        coloured = _to_level(_encode_srgb(np.clip(values / high, 0.0, 1.0)))
+        coloured = _to_level(_encode_srgb(np.clip(values, 0.0, high) / high))
     else:
         coloured = _colour_table()[_to_level(to_scale(values, low, high))]
     coloured[~finite] = NOT_FINITE_COLOUR
     return coloured
+
+
+def to_srgb8(image: npt.NDArray[np.floating[Any]], white: float) -> npt.NDArray[np.uint8]:
+    """Expose a map and encode it as sRGB, one channel as one: what a program takes for light, and nobody for a chart.
+
+    Parameters
+    ----------
+    image
+        [rows, columns] or [rows, columns, 3].
+    white
+        Value that becomes white; what is above is clipped, and what is not finite is black.
+
+    Returns
+    -------
+    numpy.ndarray
+        uint8, of the image's shape.
+
+    Raises
+    ------
+    InputError
+        `image` is no map, or white is no value.
+    """
+    is_colour(image)
+    if not 0.0 < white < math.inf:
+        raise InputError(f"the white of a picture must be a finite value above 0, not {white}")
+    return _to_level(_encode_srgb(np.clip(np.where(np.isfinite(image), image, 0.0), 0.0, white) / white))
 
 
 def _to_level(share: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint8]:

@@ -12,6 +12,7 @@ from .height_map import sample_heights, surface_hull
 if TYPE_CHECKING:
     from .assets import Assets
     from .scene import Scene
+    from .simulation import Sea
 
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2]."""
@@ -63,17 +64,24 @@ def angular_frequency(wavenumber: np.ndarray, depth: float) -> np.ndarray:
     return np.sqrt(GRAVITY * wavenumber * np.tanh(wavenumber * depth))
 
 
+def is_radial(scene: Scene) -> bool:
+    """Tell whether the water is rings around the map's middle."""
+    return scene.water.preset == "radial"
+
+
 def phases(scene: Scene, time: float, depth: float) -> np.ndarray:
-    """Phase of each wave at the map's origin at a time, reduced to [0, 2 pi) [rad].
+    """Phase of each wave at the map's origin, or of rings at their middle, at a time, reduced to [0, 2 pi) [rad].
 
     Taken in float64, so that neither a distant map nor a late time costs the kernels a digit.
     """
-    waves = scene.water.waves or ()
+    waves = scene.waves
     k = np.array([wave.wavevector for wave in waves], dtype=np.float64).reshape(-1, 2)
     given = [wave.angular_frequency for wave in waves]
     own = angular_frequency(np.hypot(k[:, 0], k[:, 1]), depth)
     omega = np.array([own[i] if w is None else w for i, w in enumerate(given)])
-    phase = np.array([wave.phase for wave in waves]) + k @ np.asarray(scene.map.origin, dtype=np.float64)
+    phase = np.array([wave.phase for wave in waves])
+    if not is_radial(scene):
+        phase = phase + k @ np.asarray(scene.map.origin, dtype=np.float64)
     # The two large terms are reduced apart, so that their sum does not round them together.
     return np.mod(np.mod(phase, 2.0 * np.pi) - np.mod(omega * time, 2.0 * np.pi), 2.0 * np.pi)
 
@@ -82,14 +90,15 @@ def extreme_slopes(scene: Scene, assets: Assets) -> np.ndarray:
     """Points ``[n, 2]`` whose convex hull holds every slope that the surface can have, zero among them.
 
     For waves the slopes fill a zonotope, the sum of the segments from -a k to a k; for a height map they are bounded
-    by a disk, and for a simulation declared so.
+    by a disk, and for a simulation or a spectrum declared so; rings have a slope in every direction.
     """
-    if assets.water is not None or scene.water.simulation is not None:
+    water = scene.water
+    if assets.water is not None or water.simulation is not None or water.spectrum is not None or is_radial(scene):
         angle = np.linspace(0.0, 2.0 * np.pi, DISK_DIRECTIONS, endpoint=False)
         steepest = _steepest(scene, assets) / np.cos(np.pi / DISK_DIRECTIONS)
         rim = steepest * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     else:
-        steps = np.array([np.multiply(wave.amplitude, wave.wavevector) for wave in scene.water.waves or ()])
+        steps = np.array([np.multiply(wave.amplitude, wave.wavevector) for wave in scene.waves])
         rim = zonotope(steps.reshape(-1, 2))
     share = np.arange(EDGE_POINTS)[:, None, None] / EDGE_POINTS
     outline = ((1.0 - share) * rim + share * np.roll(rim, -1, axis=0)).reshape(-1, 2)
@@ -97,11 +106,24 @@ def extreme_slopes(scene: Scene, assets: Assets) -> np.ndarray:
 
 
 def _steepest(scene: Scene, assets: Assets) -> float:
-    """Bound of the slope of a height map, or the one that a simulation declares."""
+    """Bound of the slope of a height map, the one that a simulation declares, or what a spectrum's surface reaches."""
+    if scene.water.spectrum is not None:
+        return _sea(scene, assets).max_slope
     if scene.water.simulation is not None:
         return scene.water.simulation.max_slope * (1.0 + BETWEEN_SAMPLES)
+    if is_radial(scene):
+        return sum(abs(wave.amplitude) * wave.wavevector[0] for wave in scene.waves)
     assert assets.water is not None
     return surface_hull(assets.water).slope
+
+
+def _sea(scene: Scene, assets: Assets) -> Sea:
+    """The sea of a scene's spectrum, made once."""
+    from .receiver import rest_depth
+    from .simulation import make_sea
+
+    assert scene.water.spectrum is not None
+    return make_sea(scene.water.spectrum, rest_depth(scene, assets))
 
 
 def zonotope(steps: np.ndarray) -> np.ndarray:
@@ -116,12 +138,14 @@ def zonotope(steps: np.ndarray) -> np.ndarray:
 
 def amplitude_bound(scene: Scene, assets: Assets) -> float:
     """Largest displacement from the rest level, either way [m]."""
+    if scene.water.spectrum is not None:
+        return _sea(scene, assets).max_height
     if scene.water.simulation is not None:
         return scene.water.simulation.height_bound
     if assets.water is not None:
         hull = surface_hull(assets.water)
         return max(abs(hull.lowest), abs(hull.highest))
-    return float(sum(abs(wave.amplitude) for wave in scene.water.waves or ()))
+    return float(sum(abs(wave.amplitude) for wave in scene.waves))
 
 
 def water_heights(
@@ -148,7 +172,7 @@ def water_heights(
     x, y = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
     if assets.water is not None:
         return scene.water.level + sample_heights(assets.water, x, y)
-    if scene.water.simulation is not None:
+    if scene.water.simulation is not None or scene.water.spectrum is not None:
         from .simulation import simulated_heights
 
         return scene.water.level + simulated_heights(scene, assets, x, y, time)
@@ -158,7 +182,11 @@ def water_heights(
         depth = rest_depth(scene, assets)
     z = np.full(x.shape, float(scene.water.level))
     origin = scene.map.origin
-    for wave, phase in zip(scene.water.waves or (), phases(scene, time, depth), strict=True):
+    for wave, phase in zip(scene.waves, phases(scene, time, depth), strict=True):
         kx, ky = wave.wavevector
-        z += wave.amplitude * np.sin(kx * (x - origin[0]) + ky * (y - origin[1]) + phase)
+        way = kx * (x - origin[0]) + ky * (y - origin[1])
+        if is_radial(scene):
+            middle = np.add(origin, 0.5 * np.asarray(scene.map.size))
+            way = kx * np.hypot(x - middle[0], y - middle[1])
+        z += wave.amplitude * np.sin(way + phase)
     return z

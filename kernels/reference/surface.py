@@ -1,4 +1,4 @@
-"""Height fields in float64: a tilted plane with sines, or the bicubic Hermite patches of a height map."""
+"""Height fields in float64: a tilted plane with sines, the bicubic Hermite patches of a height map, or rings."""
 
 import functools
 
@@ -22,6 +22,7 @@ class HeightField:
     slope: wp.vec2d
     sines: wp.array[Sine]
     nodes: wp.array2d[wp.vec4d]  # (z, z_u, z_v, z_uv) by node spacing
+    middle: wp.vec2d  # of rings, whose sine is the first [m]
     origin: wp.vec2d  # of node (0, 0) [m]
     spacing: wp.vec2d  # of the nodes [m]
     low: wp.vec2d  # lower corner of what is repeated [m]
@@ -47,6 +48,17 @@ def sines_at(field: HeightField, x: wp.float64, y: wp.float64) -> wp.vec3d:
         zx += rise * sine.wavevector[0]
         zy += rise * sine.wavevector[1]
     return wp.vec3d(z, zx, zy)
+
+
+@wp.func
+def rings_at(field: HeightField, x: wp.float64, y: wp.float64) -> wp.vec3d:
+    """(z, z_x, z_y) of a sine of the distance from a point, where it has no slope."""
+    sine = field.sines[0]
+    away = wp.vec2d(x, y) - field.middle
+    k = sine.wavevector[0]
+    angle = k * wp.length(away) + sine.phase
+    slope = sine.amplitude * k * wp.cos(angle) * wp.normalize(away)
+    return wp.vec3d(sine.amplitude * wp.sin(angle), slope[0], slope[1])
 
 
 @wp.func
@@ -122,5 +134,5 @@ def make_steepness(kind: str) -> wp.Function:
 
 @functools.cache
 def make_field(kind: str) -> wp.Function:
-    """The function of a kind of height field: ``"waves"``, ``"grid"`` or ``"periodic"``."""
-    return {"grid": patches_at, "periodic": periodic_at}.get(kind, sines_at)
+    """The function of a kind of height field: ``"waves"``, ``"grid"``, ``"periodic"`` or ``"radial"``."""
+    return {"grid": patches_at, "periodic": periodic_at, "radial": rings_at}.get(kind, sines_at)

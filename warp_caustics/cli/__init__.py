@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from cyclopts import CycloptsError
 
+from warp_caustics.cli import texture  # noqa: F401  it adds its command to the app
 from warp_caustics.cli.commands import app
 from warp_caustics.errors import InputError, WarpCausticsError
 

@@ -82,7 +82,7 @@ def render(
 
     stem = Path(scene).stem
     outputs = output or [Path(f"{stem}.exr" if frames is None else f"{stem}.%04d.exr")]
-    _check_outputs(outputs, frames)
+    check_outputs(outputs, frames, "--frames")
     loaded = load_scene(scene)
 
     def paths(index: int) -> list[Path]:
@@ -260,15 +260,15 @@ def _refuse(**asked: bool) -> None:
             raise InputError(f"--{name}: not yet; this version does not have it")
 
 
-def _check_outputs(outputs: list[Path], frames: int | None) -> None:
-    """Refuse names that would not do, before any work."""
+def check_outputs(outputs: list[Path], frames: int | None, option: str) -> None:
+    """Refuse names that would not do, before any work; frames are None where the option that makes them is missing."""
     from warp_caustics.files import is_sequence
 
     for path in outputs:
         if path.suffix.lower() not in SUFFIXES:
             raise InputError(f"--output: '{path}' should end in {' or '.join(SUFFIXES)}")
         if frames is None and is_sequence(path):
-            raise InputError(f"--output: '{path}' has a frame number, and --frames was not given")
+            raise InputError(f"--output: '{path}' has a frame number, and {option} was not given")
         if frames is not None and frames > 1 and not is_sequence(path):
             raise InputError(
                 f"--output: {frames} frames need a frame number in the file's name, such as "

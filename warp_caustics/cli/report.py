@@ -118,8 +118,16 @@ def print_result(
     out.print(table)
     if result.energy is not None:
         out.print(_energy_table(result.energy))
-    for warning in result.warnings:
-        out.print(f"warning: {escape(warning)}", style="yellow")
+    _print_warnings(out, result.warnings)
+
+
+def print_rows(rows: Sequence[tuple[str, str]], warnings: Sequence[str]) -> None:
+    """Print what is named, a line each, and warnings after it."""
+    table, out = _grid(), console()
+    for name, text in rows:
+        table.add_row(name, escape(text))
+    out.print(table)
+    _print_warnings(out, warnings)
 
 
 def print_info() -> None:
@@ -166,6 +174,11 @@ def _energy_table(energy: Energy) -> Table:
         if value.any():
             table.add_row(f"beside: {name}", *_watts(value), f"{_share(value, emitted):.3%}")
     return table
+
+
+def _print_warnings(out: Console, warnings: Sequence[str]) -> None:
+    for warning in warnings:
+        out.print(f"warning: {escape(warning)}", style="yellow")
 
 
 def _grid() -> Table:

@@ -37,7 +37,7 @@ def first_per_side(facts: Facts) -> int:
 def _waves(facts: Facts) -> Iterator[float]:
     terrain = facts.scene.receiver.terrain
     surfaces: tuple[Sequence[Wave | TerrainWave], ...] = (
-        facts.scene.water.waves or (),
+        facts.scene.waves,
         terrain.waves if isinstance(terrain, ClosedTerrain) else (),
     )
     for waves in surfaces:

@@ -71,9 +71,10 @@ class DeviceWorld:
         if facts.assets.water is not None:
             field = self._patches(facts.assets.water, 0.0)
         else:
-            waves = facts.scene.water.waves or ()
+            waves = facts.scene.waves
             turns = phases(facts.scene, time, facts.rest_depth)
             field = self._sines([(w.amplitude, w.wavevector, turn) for w, turn in zip(waves, turns, strict=True)])
+            field.middle = wp.vec2d(*(0.5 * side for side in facts.scene.map.size))
         field.steepest, field.highest = facts.slope, facts.amplitude
         field.step = self._step()
         return field
@@ -84,7 +85,7 @@ class DeviceWorld:
         basin, grid = simulated_surface(facts.scene, facts.assets, time)
         field, hull = self._patches(grid, 0.0), surface_hull(grid)
         field.steepest, field.highest = hull.slope, max(abs(hull.lowest), abs(hull.highest))
-        # The hull's slope is a bound, not a value: it may pass the declared one by as much as is planned for anyway.
+        # The hull's slope is a bound, not a value: it may pass the real one by as much as one between samples may.
         self.notes = bound_notes(basin, hull.slope / (1.0 + BETWEEN_SAMPLES), field.highest)
         field.low = wp.vec2d(*np.subtract(basin.origin, facts.scene.map.origin))
         field.period = wp.vec2d(*basin.size)

@@ -16,6 +16,7 @@ from warp_caustics.scene.method import (
 from warp_caustics.scene.receiver import ClosedTerrain, MeshObject, Receiver, TerrainFile, TerrainWave
 from warp_caustics.scene.scene import Scene
 from warp_caustics.scene.simulation import Drop, Obstacle, Simulation
+from warp_caustics.scene.spectrum import Spectrum
 from warp_caustics.scene.water import HeightMap, Water, Wave
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "Receiver",
     "Scene",
     "Simulation",
+    "Spectrum",
     "Sun",
     "TerrainFile",
     "TerrainWave",

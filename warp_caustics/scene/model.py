@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
@@ -90,12 +90,12 @@ class Model(BaseModel, metaclass=_RaisesInputError):
         return f"unknown key, {did_you_mean(key, known) or f'expected {listed(known)}'}"
 
 
-def exactly_one(given: Mapping[str, Any], names: tuple[str, ...], not_yet: Iterable[str] = ()) -> Iterator[str]:
-    """Yield a fault unless exactly one of these keys is given; one that is not yet known stands for any."""
+def exactly_one(given: Mapping[str, Any], names: tuple[str, ...]) -> Iterator[str]:
+    """Yield a fault unless exactly one of these keys is given."""
     present = [name for name in names if name in given]
     if len(present) > 1:
         yield f"expected exactly one of {listed(names)}, got {listed(present, 'and')}"
-    elif not present and not given.keys() & set(not_yet):
+    elif not present:
         yield f"expected exactly one of {listed(names)}, got none"
 
 

@@ -9,10 +9,11 @@ from warp_caustics.scene.frame import Camera, Map
 from warp_caustics.scene.light import Medium, Sun
 from warp_caustics.scene.method import Method
 from warp_caustics.scene.model import Model
+from warp_caustics.scene.preset import preset_waves
 from warp_caustics.scene.receiver import Receiver
 from warp_caustics.scene.text import toml_text
 from warp_caustics.scene.values import Text
-from warp_caustics.scene.water import Water
+from warp_caustics.scene.water import Water, Wave
 
 
 class Scene(Model):
@@ -43,6 +44,13 @@ class Scene(Model):
         if water is not None and receiver.plane is not None and receiver.plane >= water.level:
             raise refusal(f"expected a plane below the water's level {water.level}, got {receiver.plane}")
         return receiver
+
+    @property
+    def waves(self) -> tuple[Wave, ...]:
+        """Waves of the water: those given, or those of its preset over this map; none where it is of another kind."""
+        if self.water.preset is not None:
+            return preset_waves(self.water.preset, self.map)
+        return self.water.waves or ()
 
     @property
     def channels(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -11,6 +11,7 @@ from warp_caustics.scene.faults import listed, refusal
 from warp_caustics.scene.formats import GEOREFERENCED_SUFFIXES, HEIGHT_SUFFIXES, KEYED_SUFFIXES, suffix
 from warp_caustics.scene.model import Model, exactly_one
 from warp_caustics.scene.simulation import Simulation
+from warp_caustics.scene.spectrum import Spectrum
 from warp_caustics.scene.values import Extent, HeightPath, Number, Pair, Said, Text, one_of, truth
 
 
@@ -78,17 +79,20 @@ class HeightMap(HeightFile):
 class Water(Model):
     """The water surface."""
 
-    not_yet: ClassVar[Mapping[str, str]] = {
-        "preset": "use waves or height_map",
-        "spectrum": "use waves or height_map",
-    }
-
     level: Number = Field(description="z of the surface at rest [m]")
     waves: Annotated[tuple[Wave, ...], Said("a list of tables")] | None = Field(
         default=None, description="waves, which add up; an empty list is flat water"
     )
+    preset: Annotated[Literal["ripples", "waves", "radial"], one_of("ripples", "waves", "radial")] | None = Field(
+        default=None,
+        description="instead of `waves`: those of Collard & Mundi, laid over the map, four of their units to its "
+        "shorter side. `ripples` are their (sin 2x + sin πx) / 2 along both axes, `waves` the same with greater waves "
+        "on top, `radial` their A sin(-π d f + t), d being the way from the map's middle; amplitudes, frequencies and "
+        "directions are this library's",
+    )
     height_map: HeightMap | None = Field(default=None, description="instead of `waves`: displacement from `level`")
     simulation: Simulation | None = Field(default=None, description="instead of `waves`: water that drops fall into")
+    spectrum: Spectrum | None = Field(default=None, description="instead of `waves`: a sea, periodic in space")
     self_shadow: Annotated[Literal["auto"] | bool, one_of("auto", other=truth, or_else=", true or false")] = Field(
         default="auto",
         description='crests shade troughs: "auto" is on when the bound of the slope passes the sun\'s elevation',
@@ -98,4 +102,4 @@ class Water(Model):
     def rules(cls, given: Mapping[str, Any]) -> Iterator[str]:
         """Yield the fault of several kinds of water, or none."""
         yield from super().rules(given)
-        yield from exactly_one(given, ("waves", "height_map", "simulation"), cls.not_yet)
+        yield from exactly_one(given, ("waves", "preset", "height_map", "simulation", "spectrum"))

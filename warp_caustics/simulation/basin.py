@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..kernels.fft import LONGEST, SHORTEST
 from ..water import GRAVITY
+from .body import WaterBody
 from .chebyshev import MOST_ITERATIONS, chebyshev_count, stiffest_solved
 from .drops import WIDEST_DROP, check_drops, check_open
 
@@ -39,19 +40,13 @@ SHOWN = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Basin:
+class Basin(WaterBody):
     """Simulated water, resolved: lengths in metres, times in seconds, positions in the world.
 
     Attributes
     ----------
     settings : Simulation
         As the scene gives them.
-    origin, size : (float, float)
-        The rectangle.
-    rows, columns : int
-        Its cells.
-    depth : float
-        Of the water at rest.
     step : float
         Of time; 0 where no steps are taken.
     solid : ndarray or None
@@ -59,11 +54,6 @@ class Basin:
     """
 
     settings: Simulation
-    origin: tuple[float, float]
-    size: tuple[float, float]
-    rows: int
-    columns: int
-    depth: float
     step: float = 0.0
     solid: np.ndarray | None = field(default=None, repr=False)
 
@@ -83,15 +73,24 @@ class Basin:
         return self.settings.kind == "grid" and self.settings.integrator == "explicit"
 
     @property
-    def cell(self) -> tuple[float, float]:
-        """Sides of a cell [m]."""
-        return self.size[0] / self.columns, self.size[1] / self.rows
+    def summary(self) -> str:
+        """What is simulated, in words."""
+        return f"{self.settings.kind}, {self.settings.border}"
 
     @property
-    def extent(self) -> str:
-        """Where the water is, in words."""
-        (x, y), (width, height) = self.origin, self.size
-        return f"x {x:g} to {x + width:g} m, y {y:g} to {y + height:g} m"
+    def fineness(self) -> str:
+        """Path in the scene of the key that says how fine its cells are."""
+        return f"water.simulation.{'resolution' if self.settings.cell is None else 'cell'}"
+
+    @property
+    def max_slope(self) -> float:
+        """Steepest slope that is planned for, as it is declared."""
+        return self.settings.max_slope
+
+    @property
+    def max_height(self) -> float:
+        """Largest displacement that is planned for [m], as it is declared."""
+        return self.settings.height_bound
 
     @property
     def tension(self) -> float:
@@ -172,7 +171,7 @@ def make_basin(scene: Scene, rest_depth: float, low: np.ndarray, high: np.ndarra
     else:
         origin, size = (float(low[0]), float(low[1])), (float(high[0] - low[0]), float(high[1] - low[1]))
     columns, rows = _cells(settings, size)
-    plain = Basin(settings, origin, size, rows, columns, settings.depth or rest_depth)
+    plain = Basin(origin, size, rows, columns, settings.depth or rest_depth, settings)
     _check_shape(plain)
     check_drops(plain)
     if plain.spectral:
@@ -250,10 +249,9 @@ def _implicit_step(basin: Basin) -> float:
 def _check_shape(basin: Basin) -> None:
     """Refuse cells so much longer than the water is wide that it could hold no drop."""
     if max(basin.cell) > WIDEST_DROP * min(basin.size):
-        counted = "resolution" if basin.settings.cell is None else "cell"
-        key = counted if basin.settings.size is None else "size"
+        key = basin.fineness if basin.settings.size is None else "water.simulation.size"
         raise InputError(
-            f"water.simulation.{key}: expected sides that are cut into cells of about one length, got cells of "
+            f"{key}: expected sides that are cut into cells of about one length, got cells of "
             f"{basin.cell[0]:g} x {basin.cell[1]:g} m in {basin.size[0]:g} x {basin.size[1]:g} m of water"
         )
 

@@ -1,4 +1,4 @@
-"""The height of simulated water at points, for drawing: a simulation of its own on the CPU, read back."""
+"""The height of simulated water or a sea at points, for drawing: made anew on the CPU, read back."""
 
 from __future__ import annotations
 
@@ -13,17 +13,18 @@ if TYPE_CHECKING:
     from ..assets import Assets
     from ..scene import Scene
     from .basin import Basin
+    from .sea import Sea
 
 BESIDE = 3
 """Cells that are repeated or mirrored past the border, so that no one-sided difference is taken within it."""
 
 
-def simulated_surface(scene: Scene, assets: Assets, time: float) -> tuple[Basin, HeightGrid]:
+def simulated_surface(scene: Scene, assets: Assets, time: float) -> tuple[Basin | Sea, HeightGrid]:
     """Simulate a scene's water to a time [s].
 
     Returns
     -------
-    (Basin, HeightGrid)
+    (Basin or Sea, HeightGrid)
         The displacement [m], reaching some cells past the water's rectangle, where it is repeated or mirrored.
 
     Raises
@@ -32,11 +33,11 @@ def simulated_surface(scene: Scene, assets: Assets, time: float) -> tuple[Basin,
         If the kind of simulation does not reach the time.
     """
     from ..facts import gather_facts
-    from .water import KINDS
+    from .water import make_motion
 
     basin = gather_facts(scene, assets).basin
     assert basin is not None
-    motion = KINDS[basin.settings.kind](basin, "cpu")
+    motion = make_motion(basin, "cpu")
     motion.advance(time)
     z = np.pad(motion.surface.numpy(), BESIDE, mode="wrap" if basin.periodic else "symmetric")
     beside = BESIDE * np.asarray(basin.cell)

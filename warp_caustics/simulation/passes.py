@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ..program import Buffer
-from .basin import implicit_iterations
+from .basin import Basin, implicit_iterations
+from .sea import Sea
 from .spectral import padded_shape
-
-if TYPE_CHECKING:
-    from .basin import Basin
 
 
 @dataclass(frozen=True)
@@ -23,20 +20,22 @@ class SimulationPass:
     launches: int = 1
 
 
-def simulation_passes(basin: Basin) -> tuple[SimulationPass, ...]:
+def simulation_passes(basin: Basin | Sea) -> tuple[SimulationPass, ...]:
     """Say what is launched, in order."""
     closing = (
-        SimulationPass("nodes", "slopes of the simulated water at its cells"),
+        SimulationPass("nodes", "slopes of the water at its cells"),
         SimulationPass("extremes", "its steepest slope and largest height, read back when a result is"),
     )
     if basin.spectral:
+        evolve = "travel" if isinstance(basin, Sea) else "evolve"
         return (
-            SimulationPass("evolve", "each mode of the water taken to the time of the frame"),
+            SimulationPass(evolve, "each mode of the water taken to the time of the frame"),
             SimulationPass("fft_rows", "modes summed up along x, then along y", launches=2),
             SimulationPass("turn", "rows turned into columns between the two"),
-            SimulationPass("spectral_surface", "height of the simulated water at its cells"),
+            SimulationPass("spectral_surface", "height of the water at its cells"),
             *closing,
         )
+    assert isinstance(basin, Basin)
     surface = SimulationPass("surface", "height of the simulated water at a whole step")
     drops = (SimulationPass("drop", "falls into the water", "drop"),) if basin.settings.drops else ()
     steps: tuple[SimulationPass, ...]
@@ -56,24 +55,24 @@ def simulation_passes(basin: Basin) -> tuple[SimulationPass, ...]:
     return (*drops, *steps, surface, *closing)
 
 
-def frame_launches(basin: Basin) -> int:
+def frame_launches(basin: Basin | Sea) -> int:
     """Launches of every frame, steps and drops apart."""
     return sum(one.launches for one in simulation_passes(basin) if one.each == "frame")
 
 
-def step_launches(basin: Basin) -> int:
+def step_launches(basin: Basin | Sea) -> int:
     """Launches of every step."""
     return sum(one.launches for one in simulation_passes(basin) if one.each == "step")
 
 
-def node_ring(basin: Basin) -> int:
+def node_ring(basin: Basin | Sea) -> int:
     """Nodes beyond the border of the water, to each side: one past a wall, none where the water repeats."""
     return 0 if basin.periodic else 1
 
 
-def simulation_buffers(basin: Basin) -> tuple[Buffer, ...]:
+def simulation_buffers(basin: Basin | Sea) -> tuple[Buffer, ...]:
     """Say what is allocated."""
-    cells, drops = (basin.rows, basin.columns), len(basin.settings.drops)
+    cells = (basin.rows, basin.columns)
     ring = 2 * node_ring(basin)
     buffers = [Buffer("water_nodes", "vec4", (basin.rows + ring, basin.columns + ring), 16),
                Buffer("water_surface", "float64", cells, 8),
@@ -86,6 +85,8 @@ def simulation_buffers(basin: Basin) -> tuple[Buffer, ...]:
             Buffer("turned", "vec2d", (basin.columns, rows), 16),
         ]
         return tuple(buffers)
+    assert isinstance(basin, Basin)
+    drops = len(basin.settings.drops)
     state = ("water_height", "water_velocity", "pressure", *(() if basin.explicit else ("mean", "change")))
     buffers += [Buffer(name, "float64", cells, 8) for name in state]
     if basin.solid is not None:

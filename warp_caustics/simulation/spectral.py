@@ -1,4 +1,4 @@
-"""Spectral water on a device: its modes at rest, and the launches that take them to a time."""
+"""Spectral water on a device: its modes at time 0, and the launches that take them to a time."""
 
 from __future__ import annotations
 
@@ -8,16 +8,18 @@ import numpy as np
 import warp as wp
 
 from ..kernels.fft import fft_block, make_fft_rows
-from ..kernels.spectral import Dispersion, make_evolve, make_turn, spectral_surface
+from ..kernels.spectral import Dispersion, make_evolve, make_travel, make_turn, spectral_surface
 from ..water import GRAVITY
+from .basin import Basin
 from .drops import drop_profiles
+from .sea import Sea, mode_numbers
 
 if TYPE_CHECKING:
-    from .basin import Basin
+    from .body import WaterBody
 
 
 class SpectralWater:
-    """Modes of water that started at rest; nothing is kept from one time to the next.
+    """Modes that stand, of water that started at rest, or travel, of a sea; nothing is kept from a time to the next.
 
     Attributes
     ----------
@@ -25,25 +27,30 @@ class SpectralWater:
         Displacement at the cells [m], float64 ``[rows, columns]``, written by :meth:`advance`.
     """
 
-    def __init__(self, basin: Basin, device: str) -> None:
-        self._basin = basin
+    def __init__(self, basin: Basin | Sea, device: str) -> None:
         mirrored = not basin.periodic
         shape = padded_shape(basin)
-        self._spectrum: wp.array = wp.array(_spectrum(basin), dtype=wp.vec2d, device=device)
+        self._spectrum: wp.array = wp.array(_modes(basin), dtype=wp.vec2d, device=device)
         self._modes = wp.zeros((basin.rows, shape[1]), dtype=wp.vec2d, device=device)
         self._turned = wp.zeros((basin.columns, shape[0]), dtype=wp.vec2d, device=device)
         self.surface = wp.zeros((basin.rows, basin.columns), dtype=wp.float64, device=device)
         turns = np.pi if mirrored else 2.0 * np.pi
         wavenumbers = wp.vec2d(turns / basin.size[0], turns / basin.size[1])
         dispersion = Dispersion()
-        dispersion.gravity, dispersion.tension, dispersion.depth = GRAVITY, basin.tension, basin.depth
+        dispersion.gravity, dispersion.depth = GRAVITY, basin.depth
+        if isinstance(basin, Sea):
+            dispersion.unit = basin.unit_frequency
+            evolve = make_travel(basin.unit_frequency > 0.0)
+        else:
+            dispersion.tension = basin.tension
+            evolve = make_evolve(mirrored)
 
         def record(kernel: Any, dim: tuple[int, ...], inputs: list[Any], out: wp.array, block: int = 256) -> Any:
             return wp.launch(
                 kernel, dim=dim, inputs=inputs, outputs=[out], device=device, block_dim=block, record_cmd=True
             )
 
-        self._evolve = record(make_evolve(mirrored), self._modes.shape,
+        self._evolve = record(evolve, self._modes.shape,
                               [self._spectrum, wavenumbers, dispersion, wp.float64(0.0)], self._modes)  # fmt: skip
         self._launches = [self._evolve]
         for array, following in ((self._modes, self._turned), (self._turned, None)):
@@ -61,18 +68,23 @@ class SpectralWater:
             launch.launch()
 
 
-def padded_shape(basin: Basin) -> tuple[int, int]:
+def padded_shape(basin: WaterBody) -> tuple[int, int]:
     """Lengths of the transforms along y and x: between walls, twice the cells."""
     factor = 1 if basin.periodic else 2
     return factor * basin.rows, factor * basin.columns
 
 
-def _spectrum(basin: Basin) -> np.ndarray:
-    """Modes of the drops at time 0, ``[rows, columns, 2]``, so that their plain sum is the surface.
+def _modes(basin: Basin | Sea) -> np.ndarray:
+    """Modes at time 0 of a sea or of drops, ``[rows, columns, 2]``, so that their plain sum is the surface.
 
     Made once, on the host. Between walls a mode is the factor of a product of cosines, the one along x already with
     the phase of its sum.
     """
+    if isinstance(basin, Sea):
+        # Of a sea the modes' phase is that at the world's origin, and the first node stands half a cell from there.
+        half = np.exp(1j * np.pi * mode_numbers(basin.settings) / basin.rows)
+        spectrum = basin.modes * half[:, None] * half[None, :]
+        return np.ascontiguousarray(np.stack([spectrum.real, spectrum.imag], axis=-1))
     row_profiles, column_profiles = drop_profiles(basin)
     if basin.periodic:
         spectrum = np.fft.fft(row_profiles).T @ np.fft.fft(column_profiles) / (basin.rows * basin.columns)

@@ -1,33 +1,28 @@
-"""The seam: simulated water as nodes of a height map on the device, at any time."""
+"""The seam: simulated water, or a sea, as nodes of a height map on the device, at any time."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import warp as wp
 
 from ..kernels.nodes import EXTREMES, make_extremes, make_nodes
+from .basin import Basin
 from .grid import GridWater
 from .passes import node_ring
+from .sea import Sea
 from .spectral import SpectralWater
-
-if TYPE_CHECKING:
-    from .basin import Basin
-
-KINDS: dict[str, Any] = {"spectral": SpectralWater, "grid": GridWater}
-"""By ``water.simulation.kind``."""
-
 
 ROUNDING = 1.0 + 1e-6
 """Times a bound that float32 may pass."""
 
 
 class SimulatedWater:
-    """Allocates a simulation once, and records all its launches; a frame allocates nothing and reads nothing back.
+    """Allocates simulated water or a sea once, and records its launches; a frame allocates and reads back nothing.
 
     Attributes
     ----------
-    basin : Basin
+    basin : Basin or Sea
         What is simulated.
     motion : SpectralWater or GridWater
         What moves the water, and owns its state.
@@ -38,9 +33,9 @@ class SimulatedWater:
         How many.
     """
 
-    def __init__(self, basin: Basin, device: str) -> None:
+    def __init__(self, basin: Basin | Sea, device: str) -> None:
         self.basin = basin
-        self.motion = KINDS[basin.settings.kind](basin, device)
+        self.motion = make_motion(basin, device)
         self.ring = node_ring(basin)
         shape = (basin.rows + 2 * self.ring, basin.columns + 2 * self.ring)
         self.nodes = wp.zeros(shape, dtype=wp.vec4, device=device)
@@ -73,13 +68,19 @@ class SimulatedWater:
         return bound_notes(self.basin, float(slope), float(height))
 
 
-def bound_notes(basin: Basin, slope: float, height: float) -> tuple[str, ...]:
-    """Say which declared bounds a surface of this steepest slope and largest height [m] passes."""
-    settings = basin.settings
-    declared = (("slope", slope, settings.max_slope), ("height", height, settings.height_bound))
+def make_motion(basin: Basin | Sea, device: str) -> Any:
+    """What moves this water: a :class:`SpectralWater` or a :class:`GridWater`."""
+    return GridWater(basin, device) if isinstance(basin, Basin) and not basin.spectral else SpectralWater(basin, device)
+
+
+def bound_notes(basin: Basin | Sea, slope: float, height: float) -> tuple[str, ...]:
+    """Say which bounds a surface of this steepest slope and largest height [m] passes."""
+    sea = isinstance(basin, Sea)
+    declared = (("slope", slope, basin.max_slope), ("height", height, basin.max_height))
     return tuple(
-        f"water.simulation: its surface reaches a {name} of {largest:.3g}, and {bound:.3g} is planned for; light may "
-        f"be missing at the map's border, and is dropped where the surface faces away from the sun: raise max_{name}"
+        f"water.{'spectrum' if sea else 'simulation'}: its surface reaches a {name} of {largest:.3g}, and {bound:.3g} "
+        f"is planned for; light may be missing at the map's border, and is dropped where the surface faces away from "
+        f"the sun: {'give it a loop, whose bounds are known' if sea else f'raise max_{name}'}"
         for name, largest, bound in declared
         if largest > bound * ROUNDING
     )
