@@ -12,7 +12,7 @@ from typing import Any, get_args
 
 from warp_caustics.scene import IOR_TABLE, JERLOV_TABLE, METHODS, PLANNED_METHODS, Scene, bundled_scenes
 from warp_caustics.scene.faults import listed, shown
-from warp_caustics.scene.formats import HEIGHT_SUFFIXES, MESH_SUFFIXES
+from warp_caustics.scene.formats import HEIGHT_SUFFIXES, MESH_SUFFIXES, TEXTURE_SUFFIXES
 from warp_caustics.scene.model import Model, expectation
 
 PAGE = Path(__file__).with_name("scene.md")
@@ -101,6 +101,7 @@ def _appendix() -> list[str]:
         "## Files and methods\n",
         f"- Height maps: {listed(HEIGHT_SUFFIXES)}. GeoTIFF needs the extra `geotiff`, NetCDF the extra `netcdf`.",
         f"- Meshes: {listed(MESH_SUFFIXES)}.",
+        f"- Textures of a pattern: {listed(TEXTURE_SUFFIXES)}; those of 8 bits are taken for sRGB.",
         f"- Methods: {listed(METHODS, 'and')}; not yet: {listed(PLANNED_METHODS, 'and')}.",
         "",
     ]

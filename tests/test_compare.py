@@ -83,7 +83,7 @@ def files(folder: Path) -> set[str]:
 
 
 def test_every_setting_is_measured_beside_the_reference(pool, device):
-    comparison = wc.compare(pool, device=device, threads=1)
+    comparison = wc.compare(pool, ("beam", "photon", "gather"), device=device, threads=1)
     assert [row.label for row in comparison.rows[:4]] == ["beam 1", "beam 4", "beam unrefined 1", "photon cell 4"]
     assert comparison.rows[4].label == "gather N=7"
     assert comparison.rows[5].label.startswith("gather N=")

@@ -20,12 +20,14 @@ from warp_caustics.kernels.height_field import (
     make_surface,
 )
 from warp_caustics.kernels.nodes import make_extremes, make_nodes
+from warp_caustics.kernels.pattern import PatternSpec, make_pattern
 from warp_caustics.kernels.place_table import place_table
 from warp_caustics.kernels.reference.cells import make_cells as make_reference_cells
 from warp_caustics.kernels.reference.cells import make_rays
 from warp_caustics.kernels.reference.land import make_land
 from warp_caustics.kernels.reference.photons import make_photons
 from warp_caustics.kernels.resolve import make_dry_land, make_resolve
+from warp_caustics.kernels.rest_light import make_shadow
 from warp_caustics.kernels.scatter import make_scatter
 from warp_caustics.kernels.spec import Spec
 from warp_caustics.kernels.spectral import make_evolve, make_travel, make_turn, spectral_surface
@@ -84,6 +86,10 @@ KERNELS = {
     "nodes": lambda: make_nodes(True),
     "extremes": lambda: make_extremes(True),
     "dry_land": lambda: make_dry_land(EVERYTHING),
+    "project_pattern": lambda: make_pattern(
+        PatternSpec("smoothstep", shadows=True, split=True, fresnel=True, attenuation="path", colours=3)
+    ),
+    "shadow": lambda: make_shadow("grid", True, True),
     "reference_rays": lambda: make_rays(EVERYTHING),
     "reference_rays from rings": lambda: make_rays(RINGS),
     "reference_cells": lambda: make_reference_cells(EVERYTHING),

@@ -94,7 +94,7 @@ def test_strength_scales_the_difference_from_green():
 def test_what_is_refused():
     with pytest.raises(InputError, match=r"an index of 0\.9"):
         wc.make_plan(scene(medium={"ior": (1.3, 1.4, 1.5), "dispersion": "traced", "dispersion_strength": 5.0}), "beam")
-    with pytest.raises(InputError, match='"post" shifts channels of what a camera sees, and method "beam"'):
+    with pytest.raises(InputError, match='"post" is not for method "beam"'):
         wc.make_plan(scene(medium={"ior": "sea", "dispersion": "post"}), "beam")
     with pytest.raises(InputError, match="expected an ior by channel"):
         scene(medium={"ior": 1.33, "dispersion": "traced"})

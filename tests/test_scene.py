@@ -223,7 +223,7 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
         ({"medium": {"ior": 1.3, "fresnel": 1}}, "medium.fresnel: expected true or false, got 1"),
         (
             {"method": {"name": "gahter"}},
-            'method.name: expected one of "beam", "photon", "gather" or "reference", '
+            'method.name: expected one of "beam", "photon", "gather", "pattern" or "reference", '
             'got "gahter": did you mean "gather"?',
         ),
         (
@@ -236,7 +236,7 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
         ),
         (
             {"method": {"cascaded": {}}},
-            'method.cascaded: not yet in this version, use "beam", "photon", "gather" or "reference"',
+            'method.cascaded: not yet in this version, use "beam", "photon", "gather", "pattern" or "reference"',
         ),
         ({"name": ""}, 'name: expected a text, got ""'),
     ],

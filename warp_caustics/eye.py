@@ -12,13 +12,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from .errors import InputError
 from .program import Buffer
 from .sequence import Fill, Lane, Step
 from .views import EyeView
 
 if TYPE_CHECKING:
     from .g_buffer import Normals
-    from .scene import Camera
+    from .scene import Camera, Scene
     from .triangles import Triangles
     from .views import Projection
 
@@ -116,6 +117,22 @@ def rasterize_steps(
         ),
         uploads={own["workers"]: large_workers},
     )
+
+
+def camera_of(scene: Scene, method: str) -> Camera:
+    """Return the camera that a method looks through.
+
+    Raises
+    ------
+    InputError
+        If the scene has none.
+    """
+    if scene.camera is None:
+        raise InputError(
+            f'method "{method}" needs a camera: it makes what an eye sees, and the scene has no [camera]; give it '
+            "position, target, vertical_fov and resolution"
+        )
+    return scene.camera
 
 
 def eye_view(camera: Camera) -> EyeView:

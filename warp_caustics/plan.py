@@ -107,7 +107,7 @@ class Plan:
         """What a user should know before trusting the map."""
         work = self.samples
         long = (f"map: a frame takes {work:,} cells of water, which is minutes; {TOO_FAR}",) if work > LONG_WORK else ()
-        return (*self.facts.warnings, *long)
+        return (*self.facts.warnings, *self.program.warnings, *long)
 
     def copies(self, buffer: Buffer) -> int:
         """Count how often a buffer is allocated."""
@@ -215,7 +215,7 @@ def _plan_by_channel(facts: Facts, name: str, room: Room) -> DispersedPlan:
     scene, room = facts.scene, replace(room, free=room.free // len(CHANNELS))
     if scene.medium.dispersion == "post":
         raise InputError(
-            f'medium.dispersion = "post" shifts channels of what a camera sees, and method "{name}" makes a map; '
+            f'medium.dispersion = "post" is not for method "{name}", which does not splat into a camera\'s pixels; '
             f'expected "traced", or method {quoted(DISPERSING)}'
         )
     plans = [_plan(gather_facts(channel_scene(scene, c), facts.assets), name, room) for c in range(3)]
@@ -226,6 +226,8 @@ def _plan_by_channel(facts: Facts, name: str, room: Room) -> DispersedPlan:
 
 def _plan(facts: Facts, name: str, room: Room) -> Plan:
     program = METHODS[name](facts)
+    if isinstance(program, Sequence) and not program.follows_water:
+        facts = replace(facts, basin=None)
     check_work(facts, program)
     lanes = min(room.threads, program.lanes(facts))
     plan = Plan(name, room.device, lanes, facts, program, _buffers(facts, program))

@@ -182,6 +182,11 @@ class Program:
         """What is kept and left out follows from the scene alone."""
         return None
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is to be known follows from the scene alone."""
+        return ()
+
     def launches(self, facts: Facts) -> int:
         """Kernel launches in a frame."""
         return sum(count for _, count, _ in self.pass_lines(facts))

@@ -79,6 +79,10 @@ class Sequence:
         The method's parameters as chosen, for people to read.
     reasons : tuple of Reason, optional
         What is kept and left out, and why; the scene's own where the method follows light as the scene says.
+    warnings : tuple of str
+        What a user should know of the method before trusting what it makes.
+    follows_water : bool
+        Whether the waves are looked at; if not, none are simulated.
     samples : int
         Photons, or pixels that are shaded, in a frame.
     energy : callable, optional
@@ -94,6 +98,8 @@ class Sequence:
     views: Callable[[Camera], Mapping[str, Any]] | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     reasons: tuple[Reason, ...] | None = None
+    warnings: tuple[str, ...] = ()
+    follows_water: bool = True
     samples: int = 0
     energy: Callable[[Mapping[str, Any]], Energy] | None = None
 

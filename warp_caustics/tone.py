@@ -41,6 +41,9 @@ SRGB_LINEAR_SLOPE = 12.92
 SRGB_OFFSET = 0.055
 SRGB_GAMMA = 2.4
 
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+"""Shares of red, green and blue in luminance, ITU-R BT.709: the primaries of sRGB."""
+
 
 def is_colour(image: npt.NDArray[Any]) -> bool:
     """Tell [rows, columns, 3] from [rows, columns]; anything else is refused with an InputError."""
@@ -161,6 +164,12 @@ def _encode_srgb(linear: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.floati
     """Encode linear light, 0 to 1, as sRGB."""
     curve = (1.0 + SRGB_OFFSET) * linear ** (1.0 / SRGB_GAMMA) - SRGB_OFFSET
     return np.where(linear <= SRGB_LINEAR_LIMIT, SRGB_LINEAR_SLOPE * linear, curve)
+
+
+def decode_srgb(encoded: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.floating[Any]]:
+    """Decode sRGB, 0 to 1, to linear light."""
+    curve = ((encoded + SRGB_OFFSET) / (1.0 + SRGB_OFFSET)) ** SRGB_GAMMA
+    return np.where(encoded <= SRGB_LINEAR_LIMIT * SRGB_LINEAR_SLOPE, encoded / SRGB_LINEAR_SLOPE, curve)
 
 
 @functools.cache

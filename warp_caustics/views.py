@@ -140,8 +140,7 @@ class LightView:
 
     def _axes(self) -> Float64Array:
         """Right, up and forward, as rows."""
-        forward = np.array(self.direction) / math.hypot(*self.direction)
-        return _axes(forward, _UP_Y, _UP_Z)
+        return light_axes(self.direction)
 
     def _bounds(self, axes: Float64Array) -> tuple[Float64Array, Float64Array]:
         """Least and greatest coordinate of the box along each axis, relative to its lower corner."""
@@ -199,6 +198,15 @@ class EyeView:
         camera = np.array([[focal, 0.0, columns / 2.0], [0.0, focal, rows / 2.0], [0.0, 0.0, 1.0]])
         matrix = camera @ axes
         return Projection(matrix, matrix @ (start - eye), True, float(self.near), self.resolution, start)
+
+
+def light_axes(direction: Sequence[float] | Float64Array) -> Float64Array:
+    """Right, up and forward of a view along the light, as rows: the sun's own frame.
+
+    ``right`` runs along the world's x and ``up`` along its y under a sun at the zenith.
+    """
+    forward = np.asarray(direction, dtype=np.float64)
+    return _axes(forward / math.hypot(*forward), _UP_Y, _UP_Z)
 
 
 def _axes(forward: Float64Array, up: Float64Array, other_up: Float64Array) -> Float64Array:

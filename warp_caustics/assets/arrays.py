@@ -13,7 +13,7 @@ from warp_caustics.errors import InputError
 from warp_caustics.scene.faults import did_you_mean, listed
 
 #: Pillow's modes of one channel with the file's own numbers; a palette or colours are no heights.
-_GREY_MODES = ("L", "I", "I;16", "I;16L", "I;16B", "F")
+GREY_MODES = ("L", "I", "I;16", "I;16L", "I;16B", "F")
 
 
 def read_npy(path: Path, key: str | None) -> Stored:
@@ -51,7 +51,7 @@ def read_image(path: Path, key: str | None) -> Stored:
             mode, values = image.mode, np.asarray(image)
     except (OSError, SyntaxError, ValueError, MemoryError, Image.DecompressionBombError) as error:
         raise InputError(f"{path}: cannot be read as an image: {error}") from None
-    if mode not in _GREY_MODES:
+    if mode not in GREY_MODES:
         raise InputError(f"{path}: expected a greyscale image, got one of mode {mode}")
     return Stored(values, top_row_first=True)
 

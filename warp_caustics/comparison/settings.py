@@ -8,9 +8,9 @@ from fractions import Fraction
 from typing import Any
 
 from warp_caustics.errors import InputError
-from warp_caustics.scene import BeamSettings, GatherSettings, PhotonSettings, Scene
+from warp_caustics.scene import BeamSettings, GatherSettings, PatternSettings, PhotonSettings, Scene
 
-Settings = BeamSettings | PhotonSettings | GatherSettings
+Settings = BeamSettings | PhotonSettings | GatherSettings | PatternSettings
 
 BEAM_COUNTS = (1 / 16, 1 / 4, 1.0, 4.0, 16.0)
 """Cells per pixel: steps of 4 pixels to a quarter of one."""
@@ -79,6 +79,7 @@ SERIES: dict[str, tuple[Series, ...]] = {
         Series("photon Eq. 3.3", "photon", _photons(BACKLUND_COUNTS, "cell", "backlund"), "a floor: misplaced light"),
     ),
     "gather": (Series("gather", "gather", (GatherSettings(n=PUBLISHED_N), GatherSettings())),),
+    "pattern": (Series("pattern", "pattern", (PatternSettings(),), "none: a picture, not this water"),),
 }
 """By method, what is tried. A method joins the comparison by its line here."""
 

@@ -1,6 +1,7 @@
 """One file per method: its passes in order, with their parameters.
 
-A method is a function from the facts of a scene to a :class:`~warp_caustics.program.Program`. Adding one is adding a
+A method is a function from the facts of a scene to a :class:`~warp_caustics.program.Program`, or to a
+:class:`~warp_caustics.sequence.Sequence` where it follows no strips of a lattice. Adding one is adding a
 file here and its line in :data:`METHODS`.
 """
 
@@ -11,13 +12,20 @@ from typing import TYPE_CHECKING
 
 from .beam import beam
 from .gather import gather
+from .pattern import pattern
 from .photon import photon
 
 if TYPE_CHECKING:
     from ..facts import Facts
     from ..program import Program
+    from ..sequence import Sequence
 
-METHODS: dict[str, Callable[[Facts], Program]] = {"beam": beam, "photon": photon, "gather": gather}
+METHODS: dict[str, Callable[[Facts], Program | Sequence]] = {
+    "beam": beam,
+    "photon": photon,
+    "gather": gather,
+    "pattern": pattern,
+}
 """By name."""
 
 DISPERSING = ("cascaded",)

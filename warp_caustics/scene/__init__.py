@@ -13,6 +13,7 @@ from warp_caustics.scene.method import (
     PhotonSettings,
     known_method,
 )
+from warp_caustics.scene.pattern import PatternSettings, Volume
 from warp_caustics.scene.receiver import ClosedTerrain, MeshObject, Receiver, TerrainFile, TerrainWave
 from warp_caustics.scene.scene import Scene
 from warp_caustics.scene.simulation import Drop, Obstacle, Simulation
@@ -36,6 +37,7 @@ __all__ = [
     "MeshObject",
     "Method",
     "Obstacle",
+    "PatternSettings",
     "PhotonSettings",
     "Receiver",
     "Scene",
@@ -44,6 +46,7 @@ __all__ = [
     "Sun",
     "TerrainFile",
     "TerrainWave",
+    "Volume",
     "Water",
     "Wave",
     "bundled_scenes",

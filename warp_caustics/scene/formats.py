@@ -14,6 +14,8 @@ IMAGE_SUFFIXES: Final = (".png", ".bmp", ".jpg", ".jpeg")
 GEOTIFF_SUFFIXES: Final = (".tif", ".tiff")
 NETCDF_SUFFIXES: Final = (".nc", ".nc4", ".cdf")
 HEIGHT_SUFFIXES: Final = (".exr", ".npy", ".npz", *IMAGE_SUFFIXES, *GEOTIFF_SUFFIXES, *NETCDF_SUFFIXES)
+#: Pictures that a pattern is made of.
+TEXTURE_SUFFIXES: Final = (".exr", *IMAGE_SUFFIXES)
 
 #: Formats that can say where they lie on the ground; all others need `origin` and `size` in the scene.
 GEOREFERENCED_SUFFIXES: Final = (*GEOTIFF_SUFFIXES, *NETCDF_SUFFIXES)

@@ -11,11 +11,12 @@ from pydantic_core import PydanticCustomError
 from warp_caustics.errors import InputError
 from warp_caustics.scene.faults import quoted
 from warp_caustics.scene.model import Model
+from warp_caustics.scene.pattern import PatternSettings
 from warp_caustics.scene.values import COUNT, POSITIVE, Count, Positive, Truth, one_of, that
 
 #: The methods of this version, and those that later ones bring.
-METHODS: Final = ("beam", "photon", "gather", "reference")
-PLANNED_METHODS: Final = ("cascaded", "sample", "pattern", "area_ratio", "differential")
+METHODS: Final = ("beam", "photon", "gather", "pattern", "reference")
+PLANNED_METHODS: Final = ("cascaded", "sample", "area_ratio", "differential")
 
 
 METHOD_NAME: Final = one_of(*METHODS, not_yet=PLANNED_METHODS)
@@ -95,4 +96,5 @@ class Method(Model):
     beam: BeamSettings = Field(default=BeamSettings(), description="parameters of beam")
     photon: PhotonSettings = Field(default=PhotonSettings(), description="parameters of photon")
     gather: GatherSettings = Field(default=GatherSettings(), description="parameters of gather")
+    pattern: PatternSettings = Field(default=PatternSettings(), description="parameters of pattern")
     reference: ReferenceSettings = Field(default=ReferenceSettings(), description="parameters of reference")

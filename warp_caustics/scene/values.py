@@ -15,7 +15,7 @@ from pydantic import AfterValidator, BeforeValidator, GetCoreSchemaHandler, Type
 from pydantic_core import CoreSchema, core_schema
 
 from warp_caustics.scene.faults import did_you_mean, listed, quoted, refusal, shown
-from warp_caustics.scene.formats import HEIGHT_SUFFIXES, MESH_SUFFIXES, PREFIXES, suffix
+from warp_caustics.scene.formats import HEIGHT_SUFFIXES, MESH_SUFFIXES, PREFIXES, TEXTURE_SUFFIXES, suffix
 
 T = TypeVar("T")
 
@@ -158,12 +158,14 @@ def _items(count: int, words: str) -> BeforeValidator:
 _PAIR: Final = "[x, y], two finite numbers"
 _TRIPLE: Final = "[x, y, z], three finite numbers"
 _EXTENT: Final = "[x, y], two finite numbers above 0"
+_BOX: Final = "[x, y, z], three finite numbers above 0"
 _RESOLUTION: Final = "[columns, rows], two whole numbers of at least 1"
 _RGB: Final = "[r, g, b], three finite numbers"
 
 Pair = Annotated[tuple[Number, Number], Said(_PAIR), _items(2, _PAIR)]
 Triple = Annotated[tuple[Number, Number, Number], Said(_TRIPLE), _items(3, _TRIPLE)]
 Extent = Annotated[tuple[Positive, Positive], Said(_EXTENT), _items(2, _EXTENT)]
+Box = Annotated[tuple[Positive, Positive, Positive], Said(_BOX), _items(3, _BOX)]
 Resolution = Annotated[tuple[Count, Count], Said(_RESOLUTION), _items(2, _RESOLUTION)]
 
 _NON_NEGATIVE_RGB: Final = TypeAdapter(Annotated[tuple[NonNegative, NonNegative, NonNegative], _items(3, _RGB)])
@@ -223,5 +225,10 @@ HeightPath = Annotated[
 MeshPath = Annotated[
     str,
     Expects(f"a file that ends in {listed(MESH_SUFFIXES)}", _file_name(MESH_SUFFIXES)),
+    AfterValidator(_beside_scene),
+]
+TexturePath = Annotated[
+    str,
+    Expects(f"a file that ends in {listed(TEXTURE_SUFFIXES)}", _file_name(TEXTURE_SUFFIXES)),
     AfterValidator(_beside_scene),
 ]
