@@ -8,6 +8,7 @@ import pytest
 import warp as wp
 
 from warp_caustics.kernels.beam import make_cells, make_corners
+from warp_caustics.kernels.box_blur import make_box_blur
 from warp_caustics.kernels.fft import make_fft_rows
 from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
 from warp_caustics.kernels.gather_terrain import make_gather_terrain
@@ -28,6 +29,7 @@ from warp_caustics.kernels.reference.land import make_land
 from warp_caustics.kernels.reference.photons import make_photons
 from warp_caustics.kernels.resolve import make_dry_land, make_resolve
 from warp_caustics.kernels.rest_light import make_shadow
+from warp_caustics.kernels.sample import face_normals, make_heights, make_sample, scale_to_irradiance
 from warp_caustics.kernels.scatter import make_scatter
 from warp_caustics.kernels.spec import Spec
 from warp_caustics.kernels.spectral import make_evolve, make_travel, make_turn, spectral_surface
@@ -72,6 +74,11 @@ KERNELS = {
     "rows": lambda: make_rows(1),
     "columns": lambda: make_columns(3),
     "resolve": lambda: make_resolve("fixed", 3, 3),
+    "heights": lambda: make_heights("periodic"),
+    "face_normals": lambda: face_normals,
+    "sample": lambda: make_sample(True),
+    "box_blur": lambda: make_box_blur(1, 0),
+    "scale_to_irradiance": lambda: scale_to_irradiance,
     "fft_rows": lambda: make_fft_rows(1024, True),
     "evolve": lambda: make_evolve(True),
     "travel": lambda: make_travel(True),

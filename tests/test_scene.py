@@ -28,6 +28,7 @@ from warp_caustics.scene import (
     Wave,
     known_method,
 )
+from warp_caustics.scene.faults import quoted
 
 # Normalising a vector rounds its length and three quotients.
 UNIT_TOLERANCE = 1e-15
@@ -223,8 +224,7 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
         ({"medium": {"ior": 1.3, "fresnel": 1}}, "medium.fresnel: expected true or false, got 1"),
         (
             {"method": {"name": "gahter"}},
-            'method.name: expected one of "beam", "photon", "gather", "pattern" or "reference", '
-            'got "gahter": did you mean "gather"?',
+            f'method.name: expected one of {quoted(METHODS)}, got "gahter": did you mean "gather"?',
         ),
         (
             {"method": {"photon": {"footprint": -1.0}}},
@@ -236,7 +236,7 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
         ),
         (
             {"method": {"cascaded": {}}},
-            'method.cascaded: not yet in this version, use "beam", "photon", "gather", "pattern" or "reference"',
+            f"method.cascaded: not yet in this version, use {quoted(METHODS)}",
         ),
         ({"name": ""}, 'name: expected a text, got ""'),
     ],

@@ -346,3 +346,8 @@ def test_an_atlas_is_read_as_a_page_is(frames, resolution, grid):
 def test_an_atlas_needs_powers_of_two():
     with pytest.raises(wc.InputError, match=r"\[48, 64\].*\[64, 64\]"):
         FlipBook(4, (48, 64), 1)
+
+
+def test_a_method_that_mirrors_the_water_makes_no_tile():
+    with pytest.raises(wc.InputError, match='method "sample": mirrors the water'):
+        tiled(tile(), "sample")

@@ -60,6 +60,10 @@ class Change:
         return f"{self.key}: {_shown(self.before)} to {_shown(self.after)} ({self.note})"
 
 
+MIRRORS = "sample"
+"""The method that takes the water beyond the map for its mirror image."""
+
+
 def tiled(scene: Scene, method: str | None = None, rounding: bool = False) -> tuple[Scene, tuple[Change, ...]]:
     """Make a scene whose caustic map is one period of an endless pattern: a tile.
 
@@ -88,7 +92,8 @@ def tiled(scene: Scene, method: str | None = None, rounding: bool = False) -> tu
         With all that does not fit, each with the nearest that would.
     """
     fit = _Fit(scene.map.size, rounding)
-    fit.faults += _endings(scene)
+    name = scene.method.name if method is None else method
+    fit.faults += _endings(scene, name)
     water, receiver = _with_waves(scene), scene.receiver
     if water.waves is not None:
         water = water.model_copy(update={"waves": fit.waves("water.waves", water.waves)})
@@ -99,7 +104,7 @@ def tiled(scene: Scene, method: str | None = None, rounding: bool = False) -> tu
         terrain: Any = receiver.terrain
         moved = terrain.model_copy(update={"waves": fit.waves("receiver.terrain.waves", terrain.waves)})
         receiver = receiver.model_copy(update={"terrain": moved})
-    settings = fit.cells(scene, scene.method.name if method is None else method)
+    settings = fit.cells(scene, name)
     if fit.faults:
         width, height = scene.map.size
         hint = "; rounding moves the water to the nearest" if fit.movable else ""
@@ -246,7 +251,7 @@ def _with_waves(scene: Scene) -> Water:
     return scene.water.model_copy(update={"preset": None, "waves": scene.waves})
 
 
-def _endings(scene: Scene) -> Iterator[str]:
+def _endings(scene: Scene, method: str) -> Iterator[str]:
     """Yield what of a scene ends, or stands in one place, and so cannot be repeated."""
     water, receiver, kind = scene.water, scene.receiver, receiver_kind(scene)
     if water.height_map is not None:
@@ -263,6 +268,8 @@ def _endings(scene: Scene) -> Iterator[str]:
         yield f"receiver.terrain.slope: {_shown(receiver.terrain.slope)} makes a step at each seam; [0, 0] does not"  # type: ignore[union-attr]
     if receiver.objects:
         yield "receiver.objects: stand in one place; leave them out"
+    if method == MIRRORS:
+        yield f'method "{method}": mirrors the water at the border, as published; methods that follow light do not'
 
 
 def _turned(before: Sequence[float], after: Sequence[float]) -> str:

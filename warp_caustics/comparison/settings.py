@@ -8,9 +8,9 @@ from fractions import Fraction
 from typing import Any
 
 from warp_caustics.errors import InputError
-from warp_caustics.scene import BeamSettings, GatherSettings, PatternSettings, PhotonSettings, Scene
+from warp_caustics.scene import BeamSettings, GatherSettings, PatternSettings, PhotonSettings, SampleSettings, Scene
 
-Settings = BeamSettings | PhotonSettings | GatherSettings | PatternSettings
+Settings = BeamSettings | PhotonSettings | GatherSettings | PatternSettings | SampleSettings
 
 BEAM_COUNTS = (1 / 16, 1 / 4, 1.0, 4.0, 16.0)
 """Cells per pixel: steps of 4 pixels to a quarter of one."""
@@ -25,7 +25,10 @@ BACKLUND_COUNTS = (1.0, 4.0)
 PUBLISHED_N = 7
 """Yuksel & Keyser's window; it keeps M = N - 1 neighbours."""
 
-COUNT_KEY = {"beam": "samples_per_pixel", "photon": "photons_per_pixel"}
+SAMPLE_STEPS = (2, 4, 8)
+"""Around Collard & Mundi's own: what they look up is not where light goes, however often they look."""
+
+COUNT_KEY = {"beam": "samples_per_pixel", "photon": "photons_per_pixel", "sample": "sample_steps"}
 """The setting that counts what lands on a pixel."""
 
 
@@ -67,6 +70,15 @@ def _photons(counts: Sequence[float], footprint: str, projection: str = "exact")
     )
 
 
+def _samples(counts: Sequence[int]) -> tuple[Settings, ...]:
+    """As bright with more samples as with the number of the defaults: past 1 the map would be cut off."""
+    usual = SampleSettings()
+    return tuple(
+        SampleSettings(sample_steps=n, base_intensity=usual.base_intensity * ((usual.sample_steps + 1) / (n + 1)) ** 2)
+        for n in counts
+    )
+
+
 SERIES: dict[str, tuple[Series, ...]] = {
     "beam": (
         Series("beam", "beam", _beams(True)),
@@ -80,6 +92,7 @@ SERIES: dict[str, tuple[Series, ...]] = {
     ),
     "gather": (Series("gather", "gather", (GatherSettings(n=PUBLISHED_N), GatherSettings())),),
     "pattern": (Series("pattern", "pattern", (PatternSettings(),), "none: a picture, not this water"),),
+    "sample": (Series("sample", "sample", _samples(SAMPLE_STEPS)),),
 }
 """By method, what is tried. A method joins the comparison by its line here."""
 

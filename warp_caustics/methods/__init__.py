@@ -14,6 +14,7 @@ from .beam import beam
 from .gather import gather
 from .pattern import pattern
 from .photon import photon
+from .sample import sample
 
 if TYPE_CHECKING:
     from ..facts import Facts
@@ -24,6 +25,7 @@ METHODS: dict[str, Callable[[Facts], Program | Sequence]] = {
     "beam": beam,
     "photon": photon,
     "gather": gather,
+    "sample": sample,
     "pattern": pattern,
 }
 """By name."""

@@ -11,6 +11,7 @@ from warp_caustics.scene.method import (
     GatherSettings,
     Method,
     PhotonSettings,
+    SampleSettings,
     known_method,
 )
 from warp_caustics.scene.pattern import PatternSettings, Volume
@@ -40,6 +41,7 @@ __all__ = [
     "PatternSettings",
     "PhotonSettings",
     "Receiver",
+    "SampleSettings",
     "Scene",
     "Simulation",
     "Spectrum",

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, ClassVar, Final, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Final, Literal
 
 from pydantic import Field
 from pydantic_core import PydanticCustomError
@@ -12,11 +12,23 @@ from warp_caustics.errors import InputError
 from warp_caustics.scene.faults import quoted
 from warp_caustics.scene.model import Model
 from warp_caustics.scene.pattern import PatternSettings
-from warp_caustics.scene.values import COUNT, POSITIVE, Count, Positive, Truth, one_of, that
+from warp_caustics.scene.values import (
+    COUNT,
+    POSITIVE,
+    Count,
+    ImagePath,
+    NonNegative,
+    Positive,
+    Truth,
+    finite,
+    one_of,
+    that,
+    whole,
+)
 
 #: The methods of this version, and those that later ones bring.
-METHODS: Final = ("beam", "photon", "gather", "pattern", "reference")
-PLANNED_METHODS: Final = ("cascaded", "sample", "area_ratio", "differential")
+METHODS: Final = ("beam", "photon", "gather", "sample", "pattern", "reference")
+PLANNED_METHODS: Final = ("cascaded", "area_ratio", "differential")
 
 
 METHOD_NAME: Final = one_of(*METHODS, not_yet=PLANNED_METHODS)
@@ -71,6 +83,58 @@ class GatherSettings(Model):
     )
 
 
+class SampleSettings(Model):
+    """`[method.sample]`: Collard & Mundi's sampled caustic map, which follows no light."""
+
+    sample_steps: Count = Field(
+        default=4,
+        description="even steps across the square of samples, with one sample more than that each way; the authors' "
+        "code has 4",
+    )
+    sample_size: Annotated[float, that(finite, lambda size: 0.0 < size <= 0.5, "a number above 0 and up to 0.5")] = (
+        Field(default=0.5, description="half of the square's width, as a share of the map's; the authors' code has 0.5")
+    )
+    ground_offset: Positive | None = Field(
+        default=None, description="height of the water at rest above the ground [m]; the scene's own when not given"
+    )
+    base_intensity: NonNegative = Field(
+        default=2.0,
+        description="brightness of each sample; the sum is limited to 0 to 1. The default is ours, as is "
+        "environment_power's: a bright web on a dark ground on the bundled pool",
+    )
+    falloff_power: NonNegative = Field(
+        default=4.0,
+        description="a sample counts by (1 - its distance as a share of the map)^falloff_power; the authors' code "
+        "has 4",
+    )
+    weight_power: Positive = Field(
+        default=64.0,
+        description="the upright part of a normal counts by 1 - (its cosine with the way to it)^weight_power, after "
+        "the authors' code, which has 64; the paper gives no formula",
+    )
+    environment: ImagePath | None = Field(
+        default=None,
+        description="image whose first channel is the environment map, brightest in its middle; the built-in one, "
+        "max(1 - 2 r, 0)^environment_power at a distance r from its middle, when not given",
+    )
+    environment_power: Positive = Field(
+        default=512.0, description="of the built-in environment map; the default is ours"
+    )
+    vertices: Annotated[int, that(whole, lambda n: 2 <= n <= 4096, "a whole number from 2 to 4096")] = Field(
+        default=160, description="of the water's mesh over the map, each way; 160 as published"
+    )
+    blur_radius: Annotated[int, that(whole, lambda n: 0 <= n <= 64, "a whole number from 0 to 64")] = Field(
+        default=1, description="pixels that the box blur reaches each way; 0 is no blur. The default is ours"
+    )
+
+    @classmethod
+    def rules(cls, given: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the fault of two environment maps."""
+        yield from super().rules(given)
+        if {"environment", "environment_power"} <= given.keys():
+            yield "expected environment or environment_power, got both: an image has a falloff of its own"
+
+
 class ReferenceSettings(Model):
     """`[method.reference]`: the converged answer, in float64."""
 
@@ -97,4 +161,5 @@ class Method(Model):
     photon: PhotonSettings = Field(default=PhotonSettings(), description="parameters of photon")
     gather: GatherSettings = Field(default=GatherSettings(), description="parameters of gather")
     pattern: PatternSettings = Field(default=PatternSettings(), description="parameters of pattern")
+    sample: SampleSettings = Field(default=SampleSettings(), description="parameters of sample")
     reference: ReferenceSettings = Field(default=ReferenceSettings(), description="parameters of reference")

@@ -15,7 +15,14 @@ from pydantic import AfterValidator, BeforeValidator, GetCoreSchemaHandler, Type
 from pydantic_core import CoreSchema, core_schema
 
 from warp_caustics.scene.faults import did_you_mean, listed, quoted, refusal, shown
-from warp_caustics.scene.formats import HEIGHT_SUFFIXES, MESH_SUFFIXES, PREFIXES, TEXTURE_SUFFIXES, suffix
+from warp_caustics.scene.formats import (
+    HEIGHT_SUFFIXES,
+    IMAGE_SUFFIXES,
+    MESH_SUFFIXES,
+    PREFIXES,
+    TEXTURE_SUFFIXES,
+    suffix,
+)
 
 T = TypeVar("T")
 
@@ -230,5 +237,10 @@ MeshPath = Annotated[
 TexturePath = Annotated[
     str,
     Expects(f"a file that ends in {listed(TEXTURE_SUFFIXES)}", _file_name(TEXTURE_SUFFIXES)),
+    AfterValidator(_beside_scene),
+]
+ImagePath = Annotated[
+    str,
+    Expects(f"a file that ends in {listed(IMAGE_SUFFIXES)}", _file_name(IMAGE_SUFFIXES)),
     AfterValidator(_beside_scene),
 ]
