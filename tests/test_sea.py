@@ -114,8 +114,11 @@ def test_the_height_that_is_drawn_is_that_of_the_sea():
 
 
 def test_bounds_that_are_passed_are_told(device):
-    made = wc.make_plan(scene(spectrum=sea()), "photon", "cpu", 1).facts.basin
+    facts = wc.make_plan(scene(spectrum=sea()), "photon", "cpu", 1).facts
+    made = facts.basin
     assert isinstance(made, Sea)
+    assert facts.spec.declared  # so that light past them is dropped
+    assert (facts.amplitude, facts.slope) == (made.max_height, pytest.approx(made.max_slope, rel=2e-3))
     assert bound_notes(made, made.max_slope, made.max_height) == ()
     (note,) = bound_notes(made, 1.01 * made.max_slope, made.max_height)
     assert note.startswith("water.spectrum: its surface reaches a slope of")

@@ -146,25 +146,32 @@ def test_each_mode_has_its_share_of_the_spectrum(kind):
     assert (variances[0, 1:7] > 0.0).all()
 
 
-@pytest.mark.parametrize(
-    ("kind", "more"), [*((kind, {}) for kind in KINDS), ("jonswap", {"spreading": MOST_SPREADING})]
-)
-def test_variance_slope_and_peak_are_those_of_the_spectrum(kind, more):
+SEAS = {
+    "jonswap": ("jonswap", {}, DEPTH),
+    "pm": ("pm", {}, DEPTH),
+    "over shallows": ("tma", {}, 0.5),
+    "narrow": ("jonswap", {"spreading": MOST_SPREADING}, DEPTH),
+}
+
+
+@pytest.mark.parametrize("name", SEAS)
+def test_variance_slope_and_peak_are_those_of_the_spectrum(name):
     """Against integrals over frequency alone, from half a wave in the square to the cut-off."""
+    kind, more, depth = SEAS[name]
     settings = spectrum(kind, direction=20.0, **more)
-    variances, vectors = energies(settings)
+    variances, vectors = energies(settings, depth)
     unit = 2.0 * np.pi / settings.period
     k = unit * np.linspace(0.5, settings.resolution / NODES_A_WAVE, 20001)
-    per_wave = frequency_spectrum(settings, k, DEPTH) * np.gradient(angular_frequency(k, DEPTH), k)
-    for name, weight in (("variance", 1.0), ("slope", k**2)):
+    per_wave = frequency_spectrum(settings, k, depth) * np.gradient(angular_frequency(k, depth), k)
+    for share, weight in (("variance", 1.0), ("slope", k**2)):
         expected = np.sum(per_wave * weight) * (k[1] - k[0])
-        found = np.sum(variances * (1.0 if name == "variance" else np.abs(vectors) ** 2))
-        assert found == pytest.approx(expected, rel=RAGGED[name]), name
+        found = np.sum(variances * (1.0 if share == "variance" else np.abs(vectors) ** 2))
+        assert found == pytest.approx(expected, rel=RAGGED[share]), share
     rings = np.bincount(np.round(np.abs(vectors) / unit).astype(int).ravel(), variances.ravel())
-    peak = peak_frequency(settings) ** 2 / GRAVITY / unit
-    assert abs(rings.argmax() - peak) <= 1.0
-    assert make_sea(settings, DEPTH).share == pytest.approx(variances.sum() / whole_variance(settings, DEPTH))
-    assert 0.8 < make_sea(settings, DEPTH).share < 1.0
+    assert abs(rings.argmax() - k[per_wave.argmax()] / unit) <= 1.0
+    sea = make_sea(settings, depth)
+    assert sea.share == pytest.approx(variances.sum() / whole_variance(settings, depth))
+    assert 0.8 < sea.share < 1.0
 
 
 @pytest.mark.parametrize("direction", [0.0, 65.0, -140.0])

@@ -38,6 +38,9 @@ SEEN = 0.25
 """Share by which a loop may move a frequency before it is warned of: the longest wave then runs visibly off its speed.
 """
 
+FAINT = 1e-3
+"""Share of the largest amplitude under which a wave is too faint for that."""
+
 SAMPLES_A_WAVE = 4
 """Points in the shortest wave at which the surface is made then."""
 
@@ -96,9 +99,9 @@ class Sea(WaterBody):
 
     @property
     def moved(self) -> float:
-        """Largest share by which a loop moves a wave's frequency."""
+        """Largest share by which a loop moves a wave's frequency, those too faint to be seen aside."""
         kx, ky = wave_vectors(self.settings)
-        waves = np.abs(self.modes) > 0.0
+        waves = np.abs(self.modes) > FAINT * np.abs(self.modes).max()
         own = angular_frequency(np.hypot(kx, ky)[waves], self.depth)
         return float(np.abs(looped(own, self.unit_frequency) / own - 1.0).max())
 
@@ -173,11 +176,10 @@ def mode_variances(settings: Spectrum, depth: float) -> np.ndarray:
         if len(rows) == 0:
             continue
         at, weights = np.polynomial.legendre.leggauss(points)
-        for up, weight_up in zip(0.5 * at, 0.5 * weights, strict=True):
-            for along, weight in zip(0.5 * at, 0.5 * weights, strict=True):
-                kx, ky = unit * (numbers[columns] + along), unit * (numbers[rows] + up)
-                density = vector_spectrum(settings, kx, ky, depth)
-                variances[rows, columns] += weight_up * weight * unit**2 * density
+        kx = unit * (numbers[columns] + 0.5 * at[:, None])
+        for up, weight in zip(0.5 * at, 0.5 * weights, strict=True):
+            density = vector_spectrum(settings, kx, unit * (numbers[rows] + up), depth)
+            variances[rows, columns] += weight * unit**2 * (0.5 * weights @ density)
     return variances
 
 
