@@ -14,8 +14,8 @@ from .lattice import Lattice, water_along, whole
 from .photon import Scene, SunSample
 from .place_table import tabled_place
 from .spec import Spec
-from .surface import HEIGHT_AND_SLOPE
-from .waves import Wave
+from .surface import HEIGHT_AND_SLOPE, HEIGHT_SLOPE_AND_CURVATURE
+from .waves import Wave, vec6
 
 
 @wp.func
@@ -91,3 +91,41 @@ def make_water_on_lattice(spec: Spec) -> wp.Function:
             return water_at(scene.water.surface, at[0], at[1])
 
     return water_on_lattice
+
+
+@wp.func
+def wave_lattice_sum_curved(
+    waves: wp.array[Wave], column_waves: wp.array2d[wp.vec2], row_waves: wp.array2d[wp.vec2], column: int, row: int
+) -> vec6:
+    """As :func:`wave_lattice_sum`, with the second derivatives (z, z_x, z_y, z_xx, z_xy, z_yy)."""
+    total = vec6()
+    for w in range(waves.shape[0]):
+        wave = waves[w]
+        a = column_waves[column, w]
+        b = row_waves[row, w]
+        k = wave.wavevector
+        height = wave.amplitude * (a[1] * b[0] + a[0] * b[1])
+        rise = wave.amplitude * (a[0] * b[0] - a[1] * b[1])
+        total += vec6(
+            height, rise * k[0], rise * k[1], -height * k[0] * k[0], -height * k[0] * k[1], -height * k[1] * k[1]
+        )
+    return total
+
+
+@functools.cache
+def make_curved_water_on_lattice(spec: Spec) -> wp.Function:
+    """As :func:`make_water_on_lattice`, with the second derivatives."""
+    water_at = HEIGHT_SLOPE_AND_CURVATURE[spec.water]
+    tabled = spec.water == "waves"
+
+    @wp.func
+    def curved_water_on_lattice(
+        scene: Scene, column_waves: wp.array2d[wp.vec2], row_waves: wp.array2d[wp.vec2], column: int, row: int,
+        at: wp.vec2,
+    ) -> vec6:  # fmt: skip
+        if wp.static(tabled):
+            return wave_lattice_sum_curved(scene.water.surface.waves, column_waves, row_waves, column, row)
+        else:
+            return water_at(scene.water.surface, at[0], at[1])
+
+    return curved_water_on_lattice

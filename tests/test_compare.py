@@ -53,8 +53,9 @@ def quick(monkeypatch) -> None:
     monkeypatch.setattr("warp_caustics.reference.make_reference", stand_in)
     monkeypatch.setattr(measure, "ENOUGH_SECONDS", 0.0)
     monkeypatch.setattr(run, "PUBLISHED", run.PUBLISHED[:1] + run.PUBLISHED[-1:])
-    for name, series in FEW.items():
-        monkeypatch.setitem(settings.SERIES, name, series)
+    for name in list(settings.SERIES):
+        monkeypatch.delitem(settings.SERIES, name)
+    settings.SERIES.update(FEW)
 
 
 @pytest.fixture

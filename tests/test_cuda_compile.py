@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import warp as wp
 
+from warp_caustics.kernels.area_ratio import make_claim, make_triangles
 from warp_caustics.kernels.beam import make_cells, make_corners
 from warp_caustics.kernels.box_blur import make_box_blur
+from warp_caustics.kernels.centres import unclaim
+from warp_caustics.kernels.differential import make_differential
 from warp_caustics.kernels.fft import make_fft_rows
 from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
 from warp_caustics.kernels.gather_terrain import make_gather_terrain
@@ -61,6 +65,9 @@ BACKLUND = Spec(
 )
 RINGS = Spec(water="radial", tears=True, faces_away=True, exits=True, self_shadow=True)
 
+PERIODIC = replace(BACKLUND, backlund=False)
+LATEST = replace(EVERYTHING, accumulate="float32")
+
 KERNELS = {
     "wave_table": lambda: wave_table,
     "place_table": lambda: place_table,
@@ -69,6 +76,11 @@ KERNELS = {
     "torn": lambda: make_torn(EVERYTHING),
     "torn over rings": lambda: make_torn(RINGS),
     "scatter": lambda: make_scatter(BACKLUND),
+    "unclaim": lambda: unclaim,
+    "claim": lambda: make_claim(LATEST),
+    "triangles": lambda: make_triangles(LATEST, True, True, True),
+    "differential": lambda: make_differential(EVERYTHING, True),
+    "differential as parallelograms": lambda: make_differential(PERIODIC, False),
     "intersections": lambda: make_intersections(Spec()),
     "gather_terrain": lambda: make_gather_terrain(EVERYTHING),
     "rows": lambda: make_rows(1),

@@ -13,7 +13,8 @@ class Energy(Mapping[str, "float | np.ndarray"]):
     """Where the light of a frame went [W]: a number, or ``[3]`` for a scene in colour.
 
     ``emitted = received + reflected + absorbed + outside_map + left_water + blocked + missed_by_window + dropped``.
-    Beside the sum stand ``dry`` and ``over_lit``. It is a mapping, too: ``energy["received"]``.
+    Beside the sum stand ``dry``, ``over_lit`` and ``invented``: the map holds ``received + dry + invented``. It is a
+    mapping, too: ``energy["received"]``.
 
     Attributes
     ----------
@@ -40,6 +41,9 @@ class Energy(Mapping[str, "float | np.ndarray"]):
         Falls straight on dry land in the map.
     over_lit
         Lights a second time what a crest has taken already, because shadows are off.
+    invented
+        Is in the map and came from nowhere, or came and is not in the map (below 0): of a method whose brightness is a
+        ratio of areas and no sum of light. 0 for all others.
     """
 
     emitted: float | np.ndarray
@@ -53,6 +57,7 @@ class Energy(Mapping[str, "float | np.ndarray"]):
     dropped: float | np.ndarray
     dry: float | np.ndarray
     over_lit: float | np.ndarray
+    invented: float | np.ndarray = 0.0
 
     def __getitem__(self, name: str) -> float | np.ndarray:
         """Give an entry by its name."""
@@ -75,7 +80,7 @@ class Energy(Mapping[str, "float | np.ndarray"]):
         spent = sum(
             np.asarray(self[name])
             for name in self
-            if name not in ("emitted", "dry", "over_lit")
+            if name not in ("emitted", "dry", "over_lit", "invented")
         )  # fmt: skip
         emitted = np.asarray(self.emitted)
         worst = np.max(np.abs(emitted - spent))

@@ -45,6 +45,11 @@ def read_energy(plan: Plan, program: Program, ledgers: np.ndarray, caustic_map: 
     landed = caustic_map.reshape(-1, colours).sum(axis=0, dtype=np.float64) * pixel_area
     entries["dry"] = dry[:colours] * pixel_area if len(dry) else np.zeros(colours)
     entries["received"] = landed - entries["dry"]
+    entries["invented"] = np.zeros(colours)
+    if not program.conserves:
+        # What had no other fate arrived; the map's own sum is not the light that it got.
+        entries["received"] = entries["emitted"] - sum(entries[name] for name in ENTRIES[1:] if name != "over_lit")
+        entries["invented"] = landed - entries["dry"] - entries["received"]
     if plan.method == "gather":
         # The kernels book all that lands in the map.
         entries["missed_by_window"] = entries["missed_by_window"] - entries["received"]

@@ -84,9 +84,9 @@ def energy_error(energy: Energy, reference: Energy) -> float:
     """Light that a method makes (above 0) or loses (below 0) on its way, over the light in the reference's map.
 
     By the methods' own ledgers: what has a fate (received, reflected, absorbed, beside the map, out of the water,
-    blocked) and what shines twice (``over_lit``), less what was emitted. Light outside a gather's window, light without
-    a finite path, and whatever a ledger fails to add up by are lost. The reference's own balance is taken off, since
-    light from beyond a height map's border is missing there, too.
+    blocked), what shines twice (``over_lit``) and what came from nowhere (``invented``), less what was emitted. Light
+    outside a gather's window, light without a finite path, and whatever a ledger fails to add up by are lost. The
+    reference's own balance is taken off, since light from beyond a height map's border is missing there, too.
 
     Unlike :func:`bias` it is 0 for a method that puts all light somewhere, be it in the wrong place.
 
@@ -105,7 +105,7 @@ def energy_error(energy: Energy, reference: Energy) -> float:
 
 
 def _balance(energy: Energy) -> float:
-    return _sum(energy, (*FATES, "over_lit")) - _sum(energy, ("emitted",))
+    return _sum(energy, (*FATES, "over_lit", "invented")) - _sum(energy, ("emitted",))
 
 
 def _sum(energy: Energy, names: tuple[str, ...]) -> float:

@@ -156,6 +156,9 @@ class Program:
         The method's parameters as chosen, for people to read.
     banded : bool
         Whether strips may run side by side, each thread adding to a map of its own.
+    conserves : bool
+        Whether the map holds the light that arrives in it, so that its sum is what was received. Else the ledger counts
+        that apart, and what the map holds beyond it was invented.
     """
 
     lattice: Lattice
@@ -166,6 +169,7 @@ class Program:
     accumulate: str = "float32"
     settings: Mapping[str, Any] = field(default_factory=dict)
     banded: bool = True
+    conserves: bool = True
 
     @property
     def strips(self) -> int:

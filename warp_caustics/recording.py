@@ -22,7 +22,7 @@ DTYPES: Mapping[str, Any] = {
 OUTPUT = "_out"
 """Ending of a kernel's parameters that it writes; the buffer's name is what stands before it."""
 
-LEFT_OUT = frozenset({"column_waves", "row_waves", "state", "torn_cells"})
+LEFT_OUT = frozenset({"column_waves", "row_waves", "state", "torn_cells", "owner"})
 """Buffers that a kernel names and does not touch where its specification leaves them out. All others must be there:
 Warp would write through the pointer of an array that is not."""
 

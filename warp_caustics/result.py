@@ -29,6 +29,9 @@ UNITS = "unit of sun.irradiance"
 OVER_LIT_LIMIT = 0.01
 """Share of the light that may enter twice before it is worth a warning."""
 
+INVENTED_LIMIT = 0.01
+"""Share of the light in a map that may have come from nowhere before it is worth a warning."""
+
 LOST_LIMIT = 1e-5
 """Share of the light that the sums of a map may lose before it is worth a warning: what is promised on planes."""
 
@@ -128,6 +131,10 @@ class Result:
                 f"water: its shadows are off, and {over_lit / emitted:.1%} of the light enters twice, "
                 "through crests and again behind them"
             )
+        received, invented = np.max(self.energy.received), np.max(np.abs(self.energy.invented))
+        if invented > INVENTED_LIMIT * received:
+            held = np.sum(np.add(self.energy.received, self.energy.invented)) / np.sum(self.energy.received)
+            notes.append(f"{self.method}: the map holds {held:.3g} times the light that reached it")
         dropped = np.max(self.energy.dropped)
         if dropped > 0.0:
             notes.append(f"{dropped / emitted:.1e} of the light had no path that is known, and was dropped")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from warp_caustics.result import Result
 
 # These stand beside the sum of the ledger, not in it.
-BESIDE = ("dry", "over_lit")
+BESIDE = ("dry", "over_lit", "invented")
 CHANNELS = ("red", "green", "blue")
 FEW_MILLISECONDS = 10.0  # below, decimals tell
 # A pipe has no width of its own: wide enough that no path is folded there.

@@ -8,9 +8,26 @@ from fractions import Fraction
 from typing import Any
 
 from warp_caustics.errors import InputError
-from warp_caustics.scene import BeamSettings, GatherSettings, PatternSettings, PhotonSettings, SampleSettings, Scene
+from warp_caustics.scene import (
+    AreaRatioSettings,
+    BeamSettings,
+    DifferentialSettings,
+    GatherSettings,
+    PatternSettings,
+    PhotonSettings,
+    SampleSettings,
+    Scene,
+)
 
-Settings = BeamSettings | PhotonSettings | GatherSettings | PatternSettings | SampleSettings
+Settings = (
+    BeamSettings
+    | PhotonSettings
+    | GatherSettings
+    | SampleSettings
+    | PatternSettings
+    | AreaRatioSettings
+    | DifferentialSettings
+)
 
 BEAM_COUNTS = (1 / 16, 1 / 4, 1.0, 4.0, 16.0)
 """Cells per pixel: steps of 4 pixels to a quarter of one."""
@@ -22,13 +39,24 @@ PIXEL_COUNTS = (1.0, 4.0, 16.0)
 BACKLUND_COUNTS = (1.0, 4.0)
 """More photons do not mend where Eq. 3.3 puts them."""
 
+AREA_RATIO_COUNTS = (1.0, 4.0, 16.0)
+"""More cells do not make pixel centres denser."""
+
+DIFFERENTIAL_COUNTS = (1 / 4, 1.0, 4.0)
+
 PUBLISHED_N = 7
 """Yuksel & Keyser's window; it keeps M = N - 1 neighbours."""
 
 SAMPLE_STEPS = (2, 4, 8)
 """Around Collard & Mundi's own: what they look up is not where light goes, however often they look."""
 
-COUNT_KEY = {"beam": "samples_per_pixel", "photon": "photons_per_pixel", "sample": "sample_steps"}
+COUNT_KEY = {
+    "beam": "samples_per_pixel",
+    "photon": "photons_per_pixel",
+    "area_ratio": "samples_per_pixel",
+    "differential": "photons_per_pixel",
+    "sample": "sample_steps",
+}
 """The setting that counts what lands on a pixel."""
 
 
@@ -79,6 +107,20 @@ def _samples(counts: Sequence[int]) -> tuple[Settings, ...]:
     )
 
 
+def _area_ratios(area: str, overlap: str) -> tuple[Settings, ...]:
+    return tuple(
+        AreaRatioSettings.model_validate({"samples_per_pixel": n, "area": area, "overlap": overlap})
+        for n in AREA_RATIO_COUNTS
+    )
+
+
+def _differentials(footprint: str) -> tuple[Settings, ...]:
+    return tuple(
+        DifferentialSettings.model_validate({"photons_per_pixel": n, "footprint": footprint})
+        for n in DIFFERENTIAL_COUNTS
+    )
+
+
 SERIES: dict[str, tuple[Series, ...]] = {
     "beam": (
         Series("beam", "beam", _beams(True)),
@@ -91,6 +133,15 @@ SERIES: dict[str, tuple[Series, ...]] = {
         Series("photon Eq. 3.3", "photon", _photons(BACKLUND_COUNTS, "cell", "backlund"), "a floor: misplaced light"),
     ),
     "gather": (Series("gather", "gather", (GatherSettings(n=PUBLISHED_N), GatherSettings())),),
+    "area_ratio": (
+        Series("area_ratio", "area_ratio", _area_ratios("derivatives", "add"), "none: light is invented"),
+        Series("area_ratio latest", "area_ratio", _area_ratios("derivatives", "latest"), "none: light is invented"),
+        Series("area_ratio cross", "area_ratio", _area_ratios("cross", "add"), "a floor: pixel centres"),
+    ),
+    "differential": (
+        Series("differential ellipse", "differential", _differentials("ellipse")),
+        Series("differential parallelogram", "differential", _differentials("parallelogram")),
+    ),
     "pattern": (Series("pattern", "pattern", (PatternSettings(),), "none: a picture, not this water"),),
     "sample": (Series("sample", "sample", _samples(SAMPLE_STEPS)),),
 }

@@ -10,7 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from .area_ratio import area_ratio
 from .beam import beam
+from .differential import differential
 from .gather import gather
 from .pattern import pattern
 from .photon import photon
@@ -27,6 +29,8 @@ METHODS: dict[str, Callable[[Facts], Program | Sequence]] = {
     "gather": gather,
     "sample": sample,
     "pattern": pattern,
+    "area_ratio": area_ratio,
+    "differential": differential,
 }
 """By name."""
 

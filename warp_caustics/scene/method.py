@@ -27,8 +27,10 @@ from warp_caustics.scene.values import (
 )
 
 #: The methods of this version, and those that later ones bring.
-METHODS: Final = ("beam", "photon", "gather", "sample", "pattern", "reference")
-PLANNED_METHODS: Final = ("cascaded", "area_ratio", "differential")
+METHODS: Final = (
+    "beam", "photon", "gather", "sample", "pattern", "area_ratio", "differential", "reference",
+)  # fmt: skip
+PLANNED_METHODS: Final = ("cascaded",)
 
 
 METHOD_NAME: Final = one_of(*METHODS, not_yet=PLANNED_METHODS)
@@ -135,6 +137,45 @@ class SampleSettings(Model):
             yield "expected environment or environment_power, got both: an image has a falloff of its own"
 
 
+class AreaRatioSettings(Model):
+    """`[method.area_ratio]`: landed triangles drawn at pixel centres, lit by old area over new.
+
+    The defaults are what WebGL demos and engines publish, without the factors that hide how much light it invents.
+    """
+
+    samples_per_pixel: Positive = Field(default=1.0, description="surface cells for each pixel of the map, by area")
+    area: Annotated[Literal["derivatives", "cross"], one_of("derivatives", "cross")] = Field(
+        default="derivatives",
+        description="the ratio: `derivatives` is the published length(dFdx) * length(dFdy) of the old position over "
+        "that of the new, `cross` the exact ratio of the triangle's areas",
+    )
+    overlap: Annotated[Literal["add", "latest"], one_of("add", "latest")] = Field(
+        default="add",
+        description="what a pixel keeps where triangles overlap: `add` is additive blending, `latest` the last one "
+        "drawn, as without blending (the first WebGL demo)",
+    )
+    clamp: Positive | None = Field(default=None, description="largest ratio; not clamped when not given")
+
+
+FOOTPRINT_SIZE: Final = that(POSITIVE.read, lambda size: 1.0 <= size <= 1024.0, "a number from 1 to 1024")
+
+
+class DifferentialSettings(Model):
+    """`[method.differential]`: photon differentials, each photon's footprint from the curvature of the water."""
+
+    photons_per_pixel: Positive = Field(default=1.0, description="photons for each pixel of the map, by area")
+    footprint: Annotated[Literal["ellipse", "parallelogram"], one_of("ellipse", "parallelogram")] = Field(
+        default="ellipse",
+        description="`ellipse` with the kernel (3 / pi) (1 - r^2)^2, or `parallelogram`, evenly lit and clipped to the "
+        "pixels exactly",
+    )
+    largest: Annotated[float, FOOTPRINT_SIZE] = Field(
+        default=32.0,
+        description="largest half axis of an ellipse, or side of a parallelogram, in pixels; wider ones are narrowed "
+        "and keep their light",
+    )
+
+
 class ReferenceSettings(Model):
     """`[method.reference]`: the converged answer, in float64."""
 
@@ -160,6 +201,8 @@ class Method(Model):
     beam: BeamSettings = Field(default=BeamSettings(), description="parameters of beam")
     photon: PhotonSettings = Field(default=PhotonSettings(), description="parameters of photon")
     gather: GatherSettings = Field(default=GatherSettings(), description="parameters of gather")
+    area_ratio: AreaRatioSettings = Field(default=AreaRatioSettings(), description="parameters of area_ratio")
+    differential: DifferentialSettings = Field(default=DifferentialSettings(), description="parameters of differential")
     pattern: PatternSettings = Field(default=PatternSettings(), description="parameters of pattern")
     sample: SampleSettings = Field(default=SampleSettings(), description="parameters of sample")
     reference: ReferenceSettings = Field(default=ReferenceSettings(), description="parameters of reference")
