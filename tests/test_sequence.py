@@ -140,3 +140,13 @@ def test_what_a_camera_sees_is_saved_as_it_is(device, method, tmp_path):
         assert picture.size == (24, 16)
     result.save(tmp_path / "seen.exr")
     assert wc.load_map(tmp_path / "seen.exr").shape == (16, 24)
+
+
+@pytest.mark.parametrize("name", ["pattern", "sample"])
+def test_a_plan_counts_every_array_that_is_made(device, name):
+    renderer = wc.Renderer(scene_of(camera=EYE), name, device)
+    planned = {buffer.name: buffer.bytes for buffer in renderer.plan.program.own_buffers(renderer.plan.facts)}
+    made = {name: array for name, array in renderer._recording.arrays.items() if isinstance(array, wp.array)}
+    views = {name for name in made if name.endswith(".view")}  # a few numbers each
+    assert {name: array.size * wp.types.type_size_in_bytes(array.dtype) for name, array in made.items()
+            if name not in views} == planned  # fmt: skip

@@ -150,6 +150,15 @@ def view_array(projection: Projection) -> Any:
     return wp.array([device_view(projection)], dtype=View, device="cpu")
 
 
+def mesh_buffers(prefix: str, counts: tuple[int, int]) -> tuple[Buffer, ...]:
+    """Buffers that :func:`mesh_uploads` brings, for a mesh of so many vertices and triangles."""
+    vertices, triangles = counts
+    return (
+        Buffer(f"{prefix}.vertices", "vec3", (vertices,), 12),
+        Buffer(f"{prefix}.triangles", "vec3i", (triangles,), 12),
+    )
+
+
 def mesh_uploads(prefix: str, make: Callable[[str], Triangles]) -> dict[str, Callable[[str], Any]]:
     """Uploads of a mesh that keeps its place; ``make`` puts it on a device and is called once.
 

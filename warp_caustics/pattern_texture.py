@@ -56,6 +56,11 @@ def rendered_tile(device: str) -> NDArray[np.float64]:
     return made.numpy().astype(np.float64)
 
 
+def texture_shape(texture: NDArray[np.float64] | None) -> tuple[int, int]:
+    """Rows and columns of a texture, or of this library's own for None."""
+    return (TILE_PIXELS, TILE_PIXELS) if texture is None else (texture.shape[0], texture.shape[1])
+
+
 def upload_texture(texture: NDArray[np.float64] | None, device: str) -> Any:
     """Put a texture, or this library's own for None, on a device, float32 [rows, columns].
 

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from .assets import load_assets
+from .capacity import SPARE_MEMORY, check_map_fits, check_work, too_large
 from .dispersion import CHANNELS, DispersedPlan, channel_scene
 from .errors import InputError
 from .facts import Facts, gather_facts
 from .magnitude import check_asset_magnitudes, check_magnitudes
 from .methods import DISPERSING, METHODS
-from .program import MOST_WORK, Buffer, Program
+from .program import Buffer, Program
 from .scene import Scene, known_method, load_scene
 from .scene.faults import quoted
 from .sequence import Sequence
@@ -28,14 +29,8 @@ if TYPE_CHECKING:
 WAVE_BYTES, SUN_BYTES = 28, 20
 """Bytes of a wave and of a direction of the sun on the device."""
 
-MOST_VALUES = 2**31 - 1
-"""Values of one array at most, in Warp."""
-
 LONG_WORK = 2**27
 """Cells in a frame past which it takes minutes, and the plan says so."""
-
-SPARE_MEMORY = 0.9
-"""Share of the free memory that a plan may take."""
 
 
 @dataclass(frozen=True)
@@ -235,63 +230,8 @@ def _plan(facts: Facts, name: str, room: Room) -> Plan:
         # Each thread has a map of its own; with fewer there may be room.
         plan = replace(plan, threads=1)
     if plan.bytes > SPARE_MEMORY * room.free:
-        raise InputError(_too_large(plan, room.free) + (" or threads" if lanes > 1 else ""))
+        raise InputError(too_large(plan, room.free) + (" or threads" if lanes > 1 else ""))
     return plan
-
-
-def _too_large(plan: Plan, free: int) -> str:
-    """Say what takes the most of a plan that does not fit in memory."""
-    scene, basin = plan.facts.scene, plan.facts.basin
-    room = f"and {plan.device} has {free:,} free; "
-    if basin is not None:
-        water = sum(buffer.bytes for buffer in simulation_buffers(basin))
-        if 2 * water > plan.bytes:
-            return (
-                f"{basin.fineness}: {basin.columns} x {basin.rows} cells take {water:,} bytes of {plan.bytes:,}, "
-                f"{room}expected fewer cells"
-            )
-    return (
-        f"map: {scene.map.resolution[0]} x {scene.map.resolution[1]} pixels by method {plan.method} take "
-        f"{plan.bytes:,} bytes, {room}lower map.resolution"
-    )
-
-
-def check_map_fits(scene: Scene, device: str, free: int) -> None:
-    """Refuse a map whose pixels alone do not fit in memory, before anything is loaded or derived.
-
-    Raises
-    ------
-    InputError
-        With the bytes that it takes and those that are free.
-    """
-    columns, rows = scene.map.resolution
-    if columns * rows * scene.channels > MOST_VALUES:
-        raise InputError(
-            f"map.resolution: {columns} x {rows} pixels take at least {columns * rows * 4 * (1 + scene.channels):,} "
-            f"bytes, and no array holds more than {MOST_VALUES:,} values; expected a smaller map"
-        )
-    least = columns * rows * 4 * (1 + scene.channels)
-    if least > SPARE_MEMORY * free:
-        raise InputError(
-            f"map.resolution: {columns} x {rows} pixels take at least {least:,} bytes, and {device} has {free:,} free; "
-            "expected a map that fits in memory"
-        )
-
-
-def check_work(facts: Facts, program: Program | Sequence) -> None:
-    """Refuse a frame that would take days.
-
-    Raises
-    ------
-    InputError
-        With the cells that it takes.
-    """
-    work, suns = program.work(facts), len(facts.suns)
-    if work > MOST_WORK:
-        raise InputError(
-            f"map: a frame takes {work // suns:,} cells of water for each of {suns} sun direction(s), and "
-            f"{MOST_WORK:,} in all are what can be gone through; {TOO_FAR}"
-        )
 
 
 def _buffers(facts: Facts, program: Program | Sequence) -> tuple[Buffer, ...]:

@@ -73,6 +73,8 @@ class Sequence:
         are there without being named.
     uploads : mapping
         By name, functions of a device that make an array or struct, once.
+    uploaded : tuple of Buffer
+        The arrays among the uploads, so that their bytes are counted.
     views : callable, optional
         From a camera to host arrays by name: what follows the camera, copied again when it moves.
     settings : mapping
@@ -95,6 +97,7 @@ class Sequence:
     screen_map: str | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
     uploads: Mapping[str, Callable[[str], Any]] = field(default_factory=dict)
+    uploaded: tuple[Buffer, ...] = ()
     views: Callable[[Camera], Mapping[str, Any]] | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     reasons: tuple[Reason, ...] | None = None
@@ -128,7 +131,7 @@ class Sequence:
 
     def own_buffers(self, facts: Facts) -> tuple[Buffer, ...]:
         """Buffers of the method."""
-        return self.buffers
+        return (*self.buffers, *self.uploaded)
 
     def work(self, facts: Facts) -> int:
         """Photons or pixels in a frame."""

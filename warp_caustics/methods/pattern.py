@@ -16,10 +16,10 @@ import numpy as np
 
 from ..assets.textures import load_texture
 from ..errors import InputError
-from ..eye import camera_of, eye_view, mesh_uploads, rasterize_steps, view_array
+from ..eye import camera_of, eye_view, mesh_buffers, mesh_uploads, rasterize_steps, view_array
 from ..kernels.pattern import PatternSpec, make_pattern
 from ..kernels.rest_light import make_shadow
-from ..pattern_texture import upload_texture
+from ..pattern_texture import texture_shape, upload_texture
 from ..pattern_volume import device_medium, device_pattern, scale_of, volume_of
 from ..program import Buffer
 from ..scene.faults import gathered
@@ -75,6 +75,7 @@ def pattern(facts: Facts) -> Sequence:
             "pattern": lambda _: device_pattern(scene, volume),
             "medium": lambda _: device_medium(facts),
         },
+        uploaded=(*mesh_buffers("ground", counts), Buffer("texture", "float32", texture_shape(texture), 4)),
         views=lambda camera: {"eye.view": view_array(eye_view(camera).projection(origin))},
         settings={
             "texture": settings.texture or "own tile",

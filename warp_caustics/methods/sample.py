@@ -22,8 +22,9 @@ from ..sequence import Lane, Sequence, Step
 from ..specify import Reason
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from ..facts import Facts
-    from ..scene import SampleSettings
 
 BANDS = 8
 """Parts of the map that threads work on side by side; a GPU takes them one after the other."""
@@ -52,6 +53,7 @@ def sample(facts: Facts) -> Sequence:
     scene, settings = facts.scene, facts.scene.method.sample
     columns, rows = scene.map.resolution
     vertices, texels = settings.vertices, (rows, columns)
+    environment = None if settings.environment is None else load_environment(settings.environment)
     blur = settings.blur_radius > 0
     first_rows = [band * rows // BANDS for band in range(BANDS + 1)]
     return Sequence(
@@ -65,7 +67,8 @@ def sample(facts: Facts) -> Sequence:
         ),
         caustic_map="caustic_map",
         values={**_values(facts), **{f"band{i}": first for i, first in enumerate(first_rows)}},
-        uploads=_uploads(settings),
+        uploads=_uploads(environment),
+        uploaded=() if environment is None else (Buffer("environment", "float32", environment.shape, 4),),
         settings={
             **settings.model_dump(exclude_none=True, exclude={"environment_power"} if settings.environment else None),
             "ground_offset": _ground_offset(facts),
@@ -147,11 +150,10 @@ def _values(facts: Facts) -> Mapping[str, Any]:
     }
 
 
-def _uploads(settings: SampleSettings) -> Mapping[str, Callable[[str], Any]]:
-    """Read the environment map, so that a bad file is said before anything is allocated; put it on a device later."""
-    if settings.environment is None:
+def _uploads(environment: NDArray[np.float32] | None) -> Mapping[str, Callable[[str], Any]]:
+    """Put the environment map on a device later; it has been read, so that a bad file is said before anything is."""
+    if environment is None:
         return {}
-    environment = load_environment(settings.environment)
 
     def upload(device: str) -> Any:
         import warp as wp
