@@ -124,6 +124,44 @@ def test_a_sequence_without_a_name_for_it(scene, folder):
     assert files(folder) == {"small.toml", "small.0000.exr", "small.0001.exr"}
 
 
+CAMERA = """
+[camera]
+position = [0.5, 0.5, 0.6]
+target = [0.5, 0.5, 0.0]
+vertical_fov = 40.0
+resolution = [12, 8]
+"""
+
+
+def test_a_picture_is_what_the_camera_sees(scene, folder, capfd, device):
+    from PIL import Image
+
+    scene.write_text(SCENE + CAMERA)
+    assert main(["render", str(scene), "--picture", "--device", device, "-o", "frame.exr"]) == 0
+    assert main(["render", str(scene), "--picture", "--device", device]) == 0
+    out, err = capfd.readouterr()
+    assert err == "" and str(folder / "small.png") in out
+    assert files(folder) == {"small.toml", "frame.exr", "small.png"}
+    np.testing.assert_array_equal(wc.load_map("frame.exr"), wc.render(wc.load_scene(scene), device=device).picture)
+    assert Image.open("small.png").size == (12, 8)
+
+
+def test_a_sequence_of_pictures_moves(scene, folder):
+    scene.write_text(SCENE + CAMERA)
+    assert main(["render", str(scene), "--picture", "--frames", "2", "--fps", "2"]) == 0
+    assert files(folder) == {"small.toml", "small.0000.png", "small.0001.png"}
+    tokens = ["render", str(scene), "--picture", "--frames", "2", "--fps", "2", "--time", "0.25", "-o", "f.%04d.exr"]
+    assert main(tokens) == 0
+    second = wc.render(wc.load_scene(scene), time=0.75).picture
+    np.testing.assert_array_equal(wc.load_map("f.0001.exr"), second)
+    assert not np.array_equal(wc.load_map("f.0000.exr"), second)
+
+
+def test_a_picture_needs_a_camera(scene, folder, capfd):
+    assert "[camera]" in refused(capfd, "render", str(scene), "--picture")
+    assert files(folder) == {"small.toml"}
+
+
 def test_plan_prints_the_plan(scene, capfd):
     assert main(["plan", str(scene)]) == 0
     out, err = capfd.readouterr()
@@ -168,9 +206,9 @@ BAD_COMMANDS = {
     "no frames": (["render", "pool", "--frames", "0"], "--frames"),
     "frames that stand still": (["render", "pool", "--frames", "2", "--fps", "0"], "--fps"),
     "frames that are infinitely fast": (["render", "pool", "--frames", "2", "--fps", "nan"], "--fps"),
-    "a picture": (["render", "pool", "--picture"], "not yet"),
+    "a picture of another format": (["render", "pool", "--picture", "-o", "frame.jpg"], ".png"),
+    "two kinds of view": (["view", "pool", "--compare", "--method", "beam"], "--compare"),
     "a profile": (["render", "pool", "--profile"], "not yet"),
-    "a comparison": (["view", "pool", "--compare"], "not yet"),
     "a method that is none": (["render", "pool", "--method", "beem"], "beam"),
     "a method to come": (["plan", "pool", "--method", "cascaded"], "not yet"),
     "a device that is none": (["render", "pool", "--device", "gpu"], "cpu"),

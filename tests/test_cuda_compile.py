@@ -26,6 +26,7 @@ from warp_caustics.kernels.height_field import (
 )
 from warp_caustics.kernels.nodes import make_extremes, make_nodes
 from warp_caustics.kernels.pattern import PatternSpec, make_pattern
+from warp_caustics.kernels.picture import make_picture
 from warp_caustics.kernels.place_table import place_table
 from warp_caustics.kernels.reference.cells import make_cells as make_reference_cells
 from warp_caustics.kernels.reference.cells import make_rays
@@ -35,6 +36,7 @@ from warp_caustics.kernels.resolve import make_dry_land, make_resolve
 from warp_caustics.kernels.rest_light import make_shadow
 from warp_caustics.kernels.sample import face_normals, make_heights, make_sample, scale_to_irradiance
 from warp_caustics.kernels.scatter import make_scatter
+from warp_caustics.kernels.shade import PictureSpec
 from warp_caustics.kernels.spec import Spec
 from warp_caustics.kernels.spectral import make_evolve, make_travel, make_turn, spectral_surface
 from warp_caustics.kernels.torn import make_torn
@@ -67,6 +69,11 @@ RINGS = Spec(water="radial", tears=True, faces_away=True, exits=True, self_shado
 
 PERIODIC = replace(BACKLUND, backlund=False)
 LATEST = replace(EVERYTHING, accumulate="float32")
+
+LAND = PictureSpec(
+    Spec(water="grid", receiver="grid", objects=True, bounded=True), fresnel=True, by_depth=True, around=True
+)
+ROCKS = PictureSpec(Spec(water="periodic", receiver="mesh"), screen=True)
 
 KERNELS = {
     "wave_table": lambda: wave_table,
@@ -104,6 +111,9 @@ KERNELS = {
     "surface": lambda: make_surface(True, True),
     "nodes": lambda: make_nodes(True),
     "extremes": lambda: make_extremes(True),
+    "picture": lambda: make_picture(LAND),
+    "picture of a camera's own map": lambda: make_picture(ROCKS),
+    "picture as published": lambda: make_picture(PictureSpec(Spec(), published=True)),
     "dry_land": lambda: make_dry_land(EVERYTHING),
     "project_pattern": lambda: make_pattern(
         PatternSpec("smoothstep", shadows=True, split=True, fresnel=True, attenuation="path", colours=3)

@@ -26,7 +26,8 @@ KERNEL_IMPORTS = {"__future__", "collections", "dataclasses", "enum", "functools
 # Slow to import, or with effects of their own: used inside functions alone.
 HEAVY = {"OpenEXR", "matplotlib", "PIL", "pyvista", "rasterio", "vtk", "vtkmodules", "xarray"}
 # The outermost layer, which nothing else of the package may know.
-OUTER = {"warp_caustics.__main__", "warp_caustics.cli", "warp_caustics.view"}
+VIEWS = {f"warp_caustics.view{part}" for part in ("", "_compare", "_live", "_meshes")}
+OUTER = {"warp_caustics.__main__", "warp_caustics.cli", *VIEWS}
 
 
 def _module(path: Path) -> str:

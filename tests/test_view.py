@@ -13,8 +13,11 @@ import pytest
 
 import warp_caustics as wc
 from warp_caustics import view as view_module
+from warp_caustics import view_live
 from warp_caustics.cli import main
-from warp_caustics.view import check_can_show, light_picture, make_plotter, view
+from warp_caustics.view import check_can_show, light_picture, make_plotter, show_plotter, view
+from warp_caustics.view_compare import make_comparison, render_all
+from warp_caustics.view_live import LiveView
 
 SCENE = """
 [water]
@@ -154,6 +157,98 @@ def test_the_whole_scene_is_in_the_picture(make_result, tmp_path):
     lit = picture - dark > CLEAR_DIFFERENCE
     assert lit.any()
     assert not (lit[0].any() or lit[-1].any() or lit[:, 0].any() or lit[:, -1].any())
+
+
+@pytest.fixture
+def live(make_result):
+    """A live view that nobody sees."""
+    views = []
+
+    def make(receiver: str = "plane", **more) -> LiveView:
+        views.append(LiveView(make_result(receiver, half_lit("low x")).scene, device="cpu", off_screen=True, **more))
+        return views[-1]
+
+    yield make
+    for one in views:
+        one.plotter.close()
+
+
+@pytest.mark.usefixtures("drawing")
+def test_sliders_start_where_the_scene_is_and_render_nothing_until_moved(live):
+    shown = live()
+    assert shown.setting.elevation == pytest.approx(np.degrees(np.arctan2(1.0, np.hypot(0.2, 0.1))))
+    assert shown.setting.azimuth == pytest.approx(180.0 + np.degrees(np.arctan2(0.1, 0.2)))
+    assert shown.setting.depth == pytest.approx(0.5)
+    first = shown.result
+    assert [widget.GetRepresentation().GetValue() for widget in shown.sliders] == pytest.approx(
+        [shown.setting.elevation, shown.setting.azimuth, 0.5, 0.0], rel=1e-5
+    )
+    shown.move(time=0.0)
+    assert shown.result is first
+
+
+@pytest.mark.usefixtures("drawing")
+def test_a_moved_slider_renders_what_it_says(live):
+    """Each slider's map is the one that a scene with that value has."""
+    shown = live()
+    scene = shown.result.scene
+    shown.move(time=0.5)
+    np.testing.assert_array_equal(shown.result.caustic_map, wc.render(scene, device="cpu", time=0.5).caustic_map)
+    shown.move(elevation=40.0, azimuth=30.0)
+    lower = scene.model_copy(update={"sun": wc.scene.Sun(elevation=40.0, azimuth=30.0)})
+    np.testing.assert_array_equal(shown.result.caustic_map, wc.render(lower, device="cpu", time=0.5).caustic_map)
+    shown.move(depth=0.8)
+    assert shown.result.scene.water.level == pytest.approx(0.8)
+    water = next(mesh for mesh in shown.plotter.meshes if mesh.n_points == (ROWS + 1) * (COLUMNS + 1))
+    assert water.points[:, 2].mean() == pytest.approx(0.8, abs=0.02)
+    shown.move(method="photon")
+    assert shown.result.method == "photon" and shown.message == ""
+
+
+@pytest.mark.usefixtures("drawing")
+def test_a_slider_of_the_window_moves_the_light(live):
+    shown = live()
+    widget = shown.sliders[3]
+    widget.GetRepresentation().SetValue(2.0)
+    widget.InvokeEvent("EndInteractionEvent")
+    assert shown.setting.time == pytest.approx(2.0) and shown.result.time == pytest.approx(2.0)
+
+
+@pytest.mark.usefixtures("drawing")
+def test_a_method_that_cannot_serve_is_said_and_the_last_light_stays(live):
+    shown = live("terrain")
+    before = shown.result
+    shown.move(method="sample")
+    assert "flat floor" in shown.message and shown.result is before
+    shown.move(method="beam")
+    assert shown.message == ""
+    with pytest.raises(wc.InputError, match="does not follow sliders"):
+        live(method="reference")
+
+
+@pytest.mark.usefixtures("drawing")
+def test_slow_frames_are_coarser(live, monkeypatch):
+    monkeypatch.setattr(view_live, "SLOW", -1.0)
+    monkeypatch.setattr(view_live, "COARSEST", 8)
+    monkeypatch.setattr(view_live, "FINEST", COLUMNS)
+    shown = live()
+    for time, columns in ((1.0, 16), (2.0, 8), (3.0, 8)):
+        shown.move(time=time)
+        assert shown.result.scene.map.resolution == (columns, columns // 2)
+
+
+@pytest.mark.usefixtures("drawing")
+def test_all_methods_stand_side_by_side(make_result, tmp_path):
+    scene = make_result("terrain", half_lit("low x")).scene
+    shown = render_all(scene, ("beam", "sample"), "cpu")
+    assert [one.method for one in shown] == ["beam", "sample"]
+    np.testing.assert_array_equal(shown[0].image, wc.render(scene, device="cpu").caustic_map)
+    assert shown[0].milliseconds > 0.0 and not shown[0].reason
+    assert shown[1].image is None and "flat floor" in shown[1].reason
+    show_plotter(lambda: make_comparison(scene, shown, off_screen=True), tmp_path / "both.png")
+    picture = read(tmp_path / "both.png")
+    middle = picture.shape[1] // 2
+    assert picture[:, :middle].mean() > picture[:, middle:].mean() + CLEAR_DIFFERENCE
 
 
 def test_light_has_one_exposure_for_all_channels():

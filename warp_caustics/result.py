@@ -58,8 +58,6 @@ class Result:
         Where the light went [W]; None for methods that follow no light.
     seconds : float
         Time of the frame, compilation apart.
-    picture : None
-        A deferred frame: not yet.
     error_bar : float or None
         Relative L2 error that a reference's map may have (RMSE over mean); None for the other methods.
     notes : tuple of str
@@ -77,7 +75,6 @@ class Result:
     energy: Energy | None
     seconds: float
     assets: Assets = field(repr=False)
-    picture: np.ndarray | None = None
     error_bar: float | None = None
     notes: tuple[str, ...] = ()
     own_screen_map: np.ndarray | None = field(default=None, repr=False)
@@ -111,6 +108,20 @@ class Result:
 
         gaze = Gaze(self.scene, self.assets, self.scene.camera, self.device)
         return gaze.light(self.caustic_map).astype(np.float32)
+
+    @cached_property
+    def picture(self) -> np.ndarray | None:
+        """What the camera sees, float32 ``[rows, columns, 3]`` of linear radiance; None without a camera.
+
+        Row 0 is at the bottom; values are in the unit of the sun's irradiance, by steradian. It is drawn when it is
+        first asked for: a map alone compiles and launches nothing for it. See :mod:`.picture`, whose
+        ``save_picture`` writes it.
+        """
+        if self.scene.camera is None:
+            return None
+        from .picture import Painter
+
+        return Painter(self).paint(self)
 
     @property
     def image(self) -> np.ndarray:

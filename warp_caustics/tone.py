@@ -1,4 +1,4 @@
-"""Irradiance to 8-bit colour: a colour map for one channel, exposure and sRGB for three."""
+"""Light to 8-bit colour: a colour map for maps of one channel, a white value for three, a film for pictures."""
 
 from __future__ import annotations
 
@@ -31,6 +31,16 @@ COLOUR_MAP = "YlGnBu_r"
 
 NOT_FINITE_COLOUR = (255, 0, 160)
 """Pixels that are NaN or infinite stand out; the colour map has no magenta."""
+
+MATT_WHITE = 0.8
+"""What a white matt surface that faces the sun is exposed to, in the units of `FILM`: its shoulder then has room for
+sunlight that the water has focused."""
+
+FILM = (2.51, 0.03, 2.43, 0.59, 0.14)
+"""A film's response to x: (a x^2 + b x) / (c x^2 + d x + e), Narkowicz' fit of the ACES curve (2015)."""
+
+BRIGHTEST_EXPOSED = 1e6
+"""Far past white, and its square no overflow."""
 
 LEVELS = 256
 RGB = 3
@@ -153,6 +163,34 @@ def to_srgb8(image: npt.NDArray[np.floating[Any]], white: float) -> npt.NDArray[
     if not 0.0 < white < math.inf:
         raise InputError(f"the white of a picture must be a finite value above 0, not {white}")
     return _to_level(_encode_srgb(np.clip(np.where(np.isfinite(image), image, 0.0), 0.0, white) / white))
+
+
+def expose(radiance: npt.NDArray[np.floating[Any]], irradiance: float, stops: float = 0.0) -> npt.NDArray[np.uint8]:
+    """Colour a picture: exposure, the response of a film channel by channel (`FILM`), sRGB.
+
+    The exposure is that of a light meter held into the sun, so that it is the same for every frame and every method.
+
+    Parameters
+    ----------
+    radiance
+        Linear [rows, columns, 3].
+    irradiance
+        Of the sun, in the unit of the radiance times steradian.
+    stops
+        Added to the exposure; each doubles the light.
+
+    Returns
+    -------
+    numpy.ndarray
+        uint8 [rows, columns, 3]; pixels that are not finite become `NOT_FINITE_COLOUR`.
+    """
+    finite = np.isfinite(radiance).all(axis=2)
+    scale = MATT_WHITE * 2.0**stops * math.pi / irradiance if irradiance > 0.0 else 0.0
+    x = np.clip(scale * np.where(finite[..., None], radiance, 0.0), 0.0, BRIGHTEST_EXPOSED)
+    a, b, c, d, e = FILM
+    shown = _to_level(_encode_srgb(np.clip(x * (a * x + b) / (x * (c * x + d) + e), 0.0, 1.0)))
+    shown[~finite] = NOT_FINITE_COLOUR
+    return shown
 
 
 def _to_level(share: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint8]:

@@ -11,7 +11,7 @@ import itertools
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -21,11 +21,12 @@ import numpy.typing as npt
 
 from warp_caustics.errors import InputError, RenderError
 from warp_caustics.tone import RGB, is_colour, to_rgb8
+from warp_caustics.view_meshes import receiver_meshes, water_mesh
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-    from warp_caustics.assets import Assets, TriangleMesh
+    from warp_caustics.assets import Assets
     from warp_caustics.result import Result
     from warp_caustics.scene import Map, Scene
 
@@ -42,8 +43,6 @@ NO_DRAWING = (
 NO_DISPLAY = "no display to open a window on (DISPLAY is not set): write a picture with --screenshot FILE.png instead"
 
 WINDOW = (1280, 800)  # pixels
-# Vertices along one side of the lattices that are drawn: finer ones are no longer told apart in a window of this size.
-LATTICE_LIMIT = 512
 # The brightest hundredth of a map is a few thin folds; white starts there, so that the rest is not drowned in the dark.
 WHITE_PERCENTILE = 99.0
 BACKGROUND = ("#0d1418", "#26343c")  # bottom and top: dark, so that light stands out
@@ -79,8 +78,13 @@ def view(result: Result, *, screenshot: str | Path | None = None) -> None:
     if result.caustic_map is None:
         raise InputError(f'method "{result.method}" makes what the camera sees; the view shows maps in plan view')
     check_can_show(window=screenshot is None)
-    with _quiet_vtk():
-        plotter = make_plotter(result, off_screen=screenshot is not None)
+    show_plotter(lambda: make_plotter(result, off_screen=screenshot is not None), screenshot)
+
+
+def show_plotter(make: Callable[[], pv.Plotter], screenshot: str | Path | None) -> None:
+    """Open the window of a plotter and wait for its end, or write a picture of it; see :func:`check_can_show` first."""
+    with quiet_vtk():
+        plotter = make()
         if screenshot is None:
             plotter.show()
         else:
@@ -114,39 +118,80 @@ def _probe() -> str | None:
 
 def make_plotter(result: Result, *, off_screen: bool) -> pv.Plotter:
     """Put the receiver with its light, the water, the scale bar and the camera together; nothing is drawn yet."""
-    import pyvista as pv
-
     from warp_caustics.assets import load_assets
 
     scene = result.scene
     assert result.caustic_map is not None  # view has seen to it
     assets = load_assets(scene)
-    plotter = pv.Plotter(off_screen=off_screen, window_size=list(WINDOW), lighting="none")
-    plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])  # type: ignore[arg-type]  # its decorator loses self
-    towards_sun = -np.asarray(scene.sun.unit_direction)
-    plotter.add_light(pv.Light(position=tuple(towards_sun), light_type="scene light"))
-
-    picture = light_picture(result.caustic_map)[::-1]  # the first row of a picture is its top
-    texture = pv.Texture(np.ascontiguousarray(picture))
-    texture.interpolate = True
-    for mesh in _receiver_meshes(scene, assets):
-        plotter.add_mesh(mesh, texture=texture, ambient=RELIEF_AMBIENT, diffuse=1.0 - RELIEF_AMBIENT)
-    water = _water_mesh(scene, assets, result.time)
-    plotter.add_mesh(water, color=WATER_COLOR, opacity=WATER_OPACITY, smooth_shading=True, **WATER_SHINE)
-    plotter.add_mesh(water.extract_feature_edges(**BORDER_ONLY), color=WATER_COLOR, lighting=False)
+    plotter = empty_plotter(off_screen=off_screen)
+    add_sun(plotter, scene)
+    add_receiver(plotter, scene, assets, result.caustic_map)
+    add_water(plotter, scene, assets, result.time)
     plotter.add_text(f"{scene.name}: {result.method}, t = {result.time:g} s", font_size=9, color=INK)
     _add_lengths(plotter, scene.map)
-    _set_camera(plotter)
+    set_camera(plotter)
     return plotter
 
 
-def light_picture(caustic_map: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
+def empty_plotter(*, off_screen: bool, shape: tuple[int, int] = (1, 1)) -> pv.Plotter:
+    """Make a plotter of the house's size and colours, of so many rows and columns, without light."""
+    import pyvista as pv
+
+    plotter = pv.Plotter(off_screen=off_screen, window_size=list(WINDOW), lighting="none", shape=shape)
+    plotter.set_background(BACKGROUND[0], top=BACKGROUND[1])  # type: ignore[arg-type]  # its decorator loses self
+    return plotter
+
+
+def add_sun(plotter: pv.Plotter, scene: Scene) -> None:
+    """Put the sun where it stands, in the place of any other light."""
+    import pyvista as pv
+
+    plotter.remove_all_lights()
+    towards_sun = -np.asarray(scene.sun.unit_direction)
+    plotter.add_light(pv.Light(position=tuple(towards_sun), light_type="scene light"))
+
+
+def add_receiver(plotter: pv.Plotter, scene: Scene, assets: Assets, caustic_map: npt.NDArray[np.float32]) -> None:
+    """Draw what receives light, with a map upon it; in the place of what was drawn so before."""
+    texture = light_texture(light_picture(caustic_map))
+    for number, mesh in enumerate(receiver_meshes(scene, assets)):
+        plotter.add_mesh(
+            mesh, texture=texture, ambient=RELIEF_AMBIENT, diffuse=1.0 - RELIEF_AMBIENT, name=f"receiver {number}",
+            reset_camera=False, render=False,
+        )  # fmt: skip
+
+
+def add_water(plotter: pv.Plotter, scene: Scene, assets: Assets, time: float) -> None:
+    """Draw the water's surface and its border; in the place of what was drawn so before."""
+    water = water_mesh(scene, assets, time)
+    plotter.add_mesh(
+        water, color=WATER_COLOR, opacity=WATER_OPACITY, smooth_shading=True, name="water", reset_camera=False,
+        render=False, **WATER_SHINE,
+    )  # fmt: skip
+    plotter.add_mesh(
+        water.extract_feature_edges(**BORDER_ONLY), color=WATER_COLOR, lighting=False, name="border",
+        reset_camera=False, render=False,
+    )  # fmt: skip
+
+
+def light_texture(picture: npt.NDArray[np.uint8]) -> pv.Texture:
+    """Make a texture of a picture whose row 0 is at the bottom."""
+    import pyvista as pv
+
+    texture = pv.Texture(np.ascontiguousarray(picture[::-1]))  # the first row of a texture is its top
+    texture.interpolate = True
+    return texture
+
+
+def light_picture(caustic_map: npt.NDArray[np.float32], white: float | None = None) -> npt.NDArray[np.uint8]:
     """Expose a caustic map as a white diffuse ground would look under it.
 
     Parameters
     ----------
     caustic_map
         float32 [rows, columns] or [rows, columns, 3], irradiance in any unit.
+    white
+        Irradiance that is shown as white; :func:`white_of` the map if not given.
 
     Returns
     -------
@@ -154,70 +199,14 @@ def light_picture(caustic_map: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]
         sRGB, in the row order of the map; one exposure for all channels.
     """
     colour = caustic_map if is_colour(caustic_map) else np.repeat(caustic_map[..., None], RGB, axis=2)
-    brightest = colour.max(axis=2)
+    return to_rgb8(colour, (0.0, white_of(caustic_map) if white is None else white))
+
+
+def white_of(caustic_map: npt.NDArray[np.float32]) -> float:
+    """Irradiance that is to be shown as white, so that all but the thin folds of a map keeps below it."""
+    brightest = caustic_map.max(axis=2) if is_colour(caustic_map) else caustic_map
     lit = brightest[np.isfinite(brightest) & (brightest > 0.0)]
-    white = float(np.percentile(lit, WHITE_PERCENTILE)) if lit.size else 1.0
-    return to_rgb8(colour, (0.0, white))
-
-
-def _receiver_meshes(scene: Scene, assets: Assets) -> list[pv.PolyData]:
-    """Build what receives light within the map, with plan-view texture coordinates."""
-    import pyvista as pv
-
-    from warp_caustics.receiver import receiver_heights
-
-    window = scene.map
-    meshes: list[pv.PolyData] = []
-    if scene.receiver.plane is not None:
-        (left, bottom), (right, top), z = window.origin, _far_corner(window), scene.receiver.plane
-        corners = [(left, bottom, z), (right, bottom, z), (right, top, z), (left, top, z)]
-        meshes.append(pv.PolyData(np.array(corners), faces=[4, 0, 1, 2, 3]))
-    elif scene.receiver.terrain is not None:
-        x, y = _lattice(window)
-        meshes.append(pv.StructuredGrid(x, y, receiver_heights(scene, assets, x, y)))
-    meshes += [_clip(_polydata(mesh), window) for mesh in (assets.mesh, assets.objects) if mesh is not None]
-    meshes = [mesh for mesh in meshes if mesh.n_points]
-    for mesh in meshes:
-        uv = (mesh.points[:, :2].astype(np.float64) - window.origin) / window.size
-        mesh.active_texture_coordinates = uv
-    return meshes
-
-
-def _water_mesh(scene: Scene, assets: Assets, time: float) -> pv.PolyData:
-    import pyvista as pv
-
-    from warp_caustics.water import water_heights
-
-    x, y = _lattice(scene.map)
-    return pv.StructuredGrid(x, y, water_heights(scene, assets, x, y, time))
-
-
-def _lattice(window: Map) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """World coordinates of the vertices of a lattice over the map, [rows, columns] each."""
-    columns, rows = (min(count, LATTICE_LIMIT) + 1 for count in window.resolution)
-    (left, bottom), (right, top) = window.origin, _far_corner(window)
-    x, y = np.meshgrid(np.linspace(left, right, columns), np.linspace(bottom, top, rows))
-    return x, y
-
-
-def _far_corner(window: Map) -> tuple[float, float]:
-    return window.origin[0] + window.size[0], window.origin[1] + window.size[1]
-
-
-def _polydata(mesh: TriangleMesh) -> pv.PolyData:
-    import pyvista as pv
-
-    faces: Any = mesh.triangles  # any integers do, though the annotation there asks for Python's own
-    return pv.PolyData.from_regular_faces(mesh.vertices, faces)
-
-
-def _clip(mesh: pv.PolyData, window: Map) -> pv.PolyData:
-    """Cut away what lies outside the map: there is no light for it."""
-    (left, bottom), (right, top) = window.origin, _far_corner(window)
-    for normal, origin in (((-1, 0), (left, 0)), ((1, 0), (right, 0)), ((0, -1), (0, bottom)), ((0, 1), (0, top))):
-        if mesh.n_points:
-            mesh = mesh.clip(normal=(*normal, 0), origin=(*origin, 0))
-    return mesh
+    return float(np.percentile(lit, WHITE_PERCENTILE)) if lit.size else 1.0
 
 
 def _add_lengths(plotter: pv.Plotter, window: Map) -> None:
@@ -241,7 +230,7 @@ def _add_lengths(plotter: pv.Plotter, window: Map) -> None:
         )
 
 
-def _set_camera(plotter: pv.Plotter) -> None:
+def set_camera(plotter: pv.Plotter) -> None:
     """Stand before the map and above it, at the distance from which everything just fits into the window."""
     low, high = np.reshape(plotter.bounds, (3, 2)).T
     middle = (low + high) / 2.0
@@ -272,7 +261,7 @@ def _write_screenshot(plotter: pv.Plotter, path: Path) -> None:
 
 
 @contextmanager
-def _quiet_vtk() -> Iterator[None]:
+def quiet_vtk() -> Iterator[None]:
     """Keep VTK from warning that there is no X server before it turns to EGL."""
     from vtkmodules.vtkCommonCore import vtkLogger
 

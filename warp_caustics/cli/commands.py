@@ -13,10 +13,13 @@ from warp_caustics import __version__
 from warp_caustics.cli import report
 from warp_caustics.cli.interrupt import Interrupt
 from warp_caustics.cli.quiet import start_warp
+from warp_caustics.cli.saving import MapSaver, PictureSaver
+from warp_caustics.cli.viewing import show_comparison, show_live
 from warp_caustics.errors import InputError
 
 DEFAULT_FPS = 24.0  # frames per second of film
 SUFFIXES = (".exr", ".png")
+CAMERA_EXPECTED = "expected a table [camera] with position, target, vertical_fov and resolution"
 
 app = App(
     name="warp-caustics",
@@ -51,7 +54,7 @@ def render(
     profile: Flag = False,
     output: Outputs | None = None,
 ) -> None:
-    """Render a caustic map, or a numbered sequence of them.
+    """Render a caustic map or a picture, or a numbered sequence of them.
 
     Parameters
     ----------
@@ -70,20 +73,23 @@ def render(
     fps
         Frames per second of a sequence.
     picture
-        The scene through its camera. Not yet.
+        What the scene's camera sees, instead of the map: linear radiance as EXR, exposed as PNG.
     profile
         Time by pass. Not yet.
     output
-        OUT.exr, OUT.png, or OUT.%04d.exr for a sequence; may be given more than once. SCENE.exr when left out.
+        OUT.exr, OUT.png, or OUT.%04d.exr for a sequence; may be given more than once. SCENE.exr, or
+        SCENE.png of a picture, when left out.
     """
-    _refuse(picture=picture, profile=profile)
+    _refuse(profile=profile)
     from warp_caustics.files import check_writable, frame_path, is_sequence
     from warp_caustics.scene import load_scene
 
-    stem = Path(scene).stem
-    outputs = output or [Path(f"{stem}.exr" if frames is None else f"{stem}.%04d.exr")]
+    stem, suffix = Path(scene).stem, "png" if picture else "exr"
+    outputs = output or [Path(f"{stem}.{suffix}" if frames is None else f"{stem}.%04d.{suffix}")]
     check_outputs(outputs, frames, "--frames")
     loaded = load_scene(scene)
+    if picture and loaded.camera is None:
+        raise InputError(f"--picture: {scene} has no camera; {CAMERA_EXPECTED}")
 
     def paths(index: int) -> list[Path]:
         return [frame_path(path, index) if is_sequence(path) else path for path in outputs]
@@ -93,22 +99,20 @@ def render(
 
     start_warp()
     from warp_caustics.renderer import make_renderer
-    from warp_caustics.tone import value_limits
 
+    saver = PictureSaver() if picture else MapSaver()
     interrupt = Interrupt()
     milliseconds = []
-    limits = None
     with interrupt.watch():
         with report.working("building kernels"):
             renderer = make_renderer(loaded, method=method, device=device, threads=threads)
         for index in report.progress(frames or 1):
             renderer.render(time + index / fps)
             result = renderer.result()
-            # One scale for all pictures of a sequence, or it would flicker.
-            limits = limits or value_limits(result.image)
+            save = saver.of(result)
             for path in paths(index):
                 with interrupt.hold():
-                    result.save(path, limits=limits)
+                    save(path)
             milliseconds.append(1e3 * result.seconds)
     report.print_result(
         result, files=outputs, frames=frames, milliseconds=milliseconds, compile_seconds=renderer.compile_seconds
@@ -208,7 +212,7 @@ def view(
     compare: Flag = False,
     screenshot: Path | None = None,
 ) -> None:
-    """Show the receiver in 3D with the caustic map on it, and the water above it.
+    """Show the receiver in 3D with the caustic map on it, and the water above it; sliders render anew.
 
     Parameters
     ----------
@@ -221,28 +225,34 @@ def view(
     time
         Seconds on the water's clock.
     compare
-        Several techniques side by side. Not yet.
+        Every technique's map side by side, with its time.
     screenshot
         A PNG to write instead of opening a window; needs no display.
     """
-    _refuse(compare=compare)
     from warp_caustics.files import check_writable
     from warp_caustics.scene import load_scene
     from warp_caustics.view import check_can_show
-    from warp_caustics.view import view as show
 
     if screenshot is not None:
         if screenshot.suffix.lower() != ".png":
             raise InputError(f"--screenshot: '{screenshot}' should end in .png")
         check_writable(screenshot)
+    if compare and method is not None:
+        raise InputError("--method: --compare shows all of them; expected one of the two")
     loaded = load_scene(scene)
     check_can_show(window=screenshot is None)
     start_warp()
-    from warp_caustics.renderer import render as render_once
+    if compare:
+        show_comparison(loaded, device, time, screenshot)
+    elif screenshot is None:
+        show_live(loaded, method, device, time)
+    else:
+        from warp_caustics.renderer import render as render_once
+        from warp_caustics.view import view as show
 
-    with report.working("building kernels and rendering"):
-        result = render_once(loaded, method=method, device=device, time=time)
-    show(result, screenshot=screenshot)
+        with report.working("building kernels and rendering"):
+            result = render_once(loaded, method=method, device=device, time=time)
+        show(result, screenshot=screenshot)
     if screenshot is not None:
         report.print_files([screenshot])
 

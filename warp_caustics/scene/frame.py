@@ -8,7 +8,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from warp_caustics.scene.faults import refusal, shown
 from warp_caustics.scene.model import Model
-from warp_caustics.scene.values import Extent, Pair, Resolution, Triple, finite, that
+from warp_caustics.scene.values import Extent, Number, Pair, Resolution, Triple, finite, that
 
 FieldOfView = Annotated[float, that(finite, lambda angle: 0.0 < angle < 180.0, "degrees above 0 and below 180")]
 
@@ -28,6 +28,7 @@ class Camera(Model):
     target: Triple = Field(description="what it looks at [m]")
     vertical_fov: FieldOfView = Field(description="full angle of view, from the lowest row to the highest [degrees]")
     resolution: Resolution = Field(description="columns, rows")
+    exposure: Number = Field(default=0.0, description="of pictures as PNG; each whole stop doubles the light")
 
     @field_validator("target")
     @classmethod

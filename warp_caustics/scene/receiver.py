@@ -9,7 +9,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo
 
 from warp_caustics.scene.faults import refusal, shown
 from warp_caustics.scene.model import Model, exactly_one
-from warp_caustics.scene.values import MeshPath, Number, Pair, Positive, Triple
+from warp_caustics.scene.values import Albedo, MeshPath, Number, Pair, Positive, Triple
 from warp_caustics.scene.water import HeightFile, Wavevector
 
 
@@ -60,6 +60,9 @@ class Receiver(Model):
     )
     mesh: MeshPath | None = Field(default=None, description="file of a mesh in world coordinates")
     objects: tuple[MeshObject, ...] = Field(default=(), description="meshes that stand on any of these")
+    albedo: Albedo = Field(
+        default=(0.60, 0.50, 0.36), description="of ground and objects, for pictures alone; pale sand when not given"
+    )
 
     @classmethod
     def rules(cls, given: Mapping[str, Any]) -> Iterator[str]:

@@ -179,6 +179,9 @@ _NON_NEGATIVE_RGB: Final = TypeAdapter(Annotated[tuple[NonNegative, NonNegative,
 _INDEX_RGB: Final = TypeAdapter(Annotated[tuple[Index, Index, Index], _items(3, _RGB)])
 _NON_NEGATIVE: Final = TypeAdapter(NonNegative)
 _INDEX: Final = TypeAdapter(Index)
+Share = Annotated[float, that(finite, lambda value: 0.0 <= value <= 1.0, "a finite number from 0 to 1")]
+_SHARE_RGB: Final = TypeAdapter(Annotated[tuple[Share, Share, Share], _items(3, _RGB)])
+_SHARE: Final = TypeAdapter(Share)
 
 
 def by_channel(number: TypeAdapter[float], rgb: TypeAdapter[tuple[float, float, float]], words: str) -> Expects:
@@ -195,9 +198,11 @@ def by_channel(number: TypeAdapter[float], rgb: TypeAdapter[tuple[float, float, 
 
 
 _COLOUR: Final = by_channel(_NON_NEGATIVE, _NON_NEGATIVE_RGB, "a finite number of at least 0, or [r, g, b] of them")
+_ALBEDO: Final = by_channel(_SHARE, _SHARE_RGB, "a finite number from 0 to 1, or [r, g, b] of them")
 _IOR: Final = by_channel(_INDEX, _INDEX_RGB, "")
 
 Colour = Annotated[float | tuple[float, float, float], _COLOUR]
+Albedo = Annotated[float | tuple[float, float, float], _ALBEDO]
 Ior = Annotated[
     float | tuple[float, float, float] | str,
     one_of("fresh", "sea", other=_IOR.read, or_else=", a finite number of at least 1, or [r, g, b] of them"),
