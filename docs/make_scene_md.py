@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args
 
-from warp_caustics.scene import IOR_TABLE, JERLOV_TABLE, METHODS, PLANNED_METHODS, Scene, bundled_scenes
+from warp_caustics.scene import IOR_TABLE, JERLOV_TABLE, METHODS, Scene, bundled_scenes
 from warp_caustics.scene.faults import listed, shown
 from warp_caustics.scene.formats import HEIGHT_SUFFIXES, MESH_SUFFIXES, TEXTURE_SUFFIXES
 from warp_caustics.scene.model import Model, expectation
@@ -102,7 +102,7 @@ def _appendix() -> list[str]:
         f"- Height maps: {listed(HEIGHT_SUFFIXES)}. GeoTIFF needs the extra `geotiff`, NetCDF the extra `netcdf`.",
         f"- Meshes: {listed(MESH_SUFFIXES)}.",
         f"- Textures of a pattern: {listed(TEXTURE_SUFFIXES)}; those of 8 bits are taken for sRGB.",
-        f"- Methods: {listed(METHODS, 'and')}; not yet: {listed(PLANNED_METHODS, 'and')}.",
+        f"- Methods: {listed(METHODS, 'and')}.",
         "",
     ]
 

@@ -210,7 +210,6 @@ BAD_COMMANDS = {
     "two kinds of view": (["view", "pool", "--compare", "--method", "beam"], "--compare"),
     "a profile": (["render", "pool", "--profile"], "not yet"),
     "a method that is none": (["render", "pool", "--method", "beem"], "beam"),
-    "a method to come": (["plan", "pool", "--method", "cascaded"], "not yet"),
     "a device that is none": (["render", "pool", "--device", "gpu"], "cpu"),
     "an absent CUDA device": (["render", "pool", "--device", "cuda:99"], "cpu"),
     "an absent CUDA device in a plan": (["plan", "pool", "--device", "cuda:99"], "cpu"),

@@ -11,9 +11,14 @@ import warp as wp
 from warp_caustics.kernels.area_ratio import make_claim, make_triangles
 from warp_caustics.kernels.beam import make_cells, make_corners
 from warp_caustics.kernels.box_blur import make_box_blur
+from warp_caustics.kernels.cascade_photon import CascadeSpec, make_cascade_photons
 from warp_caustics.kernels.centres import unclaim
+from warp_caustics.kernels.composite import make_composite, make_dry_picture
 from warp_caustics.kernels.differential import make_differential
+from warp_caustics.kernels.disperse import disperse
+from warp_caustics.kernels.eye_surface import eye_surface
 from warp_caustics.kernels.fft import make_fft_rows
+from warp_caustics.kernels.filter import make_filter
 from warp_caustics.kernels.gather import make_columns, make_intersections, make_rows
 from warp_caustics.kernels.gather_terrain import make_gather_terrain
 from warp_caustics.kernels.height_field import (
@@ -24,6 +29,7 @@ from warp_caustics.kernels.height_field import (
     make_solve,
     make_surface,
 )
+from warp_caustics.kernels.light_g_buffer import make_light_lattice, make_store_texel
 from warp_caustics.kernels.nodes import make_extremes, make_nodes
 from warp_caustics.kernels.pattern import PatternSpec, make_pattern
 from warp_caustics.kernels.picture import make_picture
@@ -67,6 +73,9 @@ BACKLUND = Spec(
 )
 RINGS = Spec(water="radial", tears=True, faces_away=True, exits=True, self_shadow=True)
 
+CASCADED = CascadeSpec(
+    replace(EVERYTHING, self_shadow=False), "depth", "angles", footprint="texel", dispersed=True, booked=True
+)
 PERIODIC = replace(BACKLUND, backlund=False)
 LATEST = replace(EVERYTHING, accumulate="float32")
 
@@ -114,6 +123,14 @@ KERNELS = {
     "picture": lambda: make_picture(LAND),
     "picture of a camera's own map": lambda: make_picture(ROCKS),
     "picture as published": lambda: make_picture(PictureSpec(Spec(), published=True)),
+    "eye_surface": lambda: eye_surface,
+    "light_lattice": lambda: make_light_lattice("periodic", False),
+    "store_texel": lambda: make_store_texel("float3", "octahedral"),
+    "cascade_photons": lambda: make_cascade_photons(CASCADED),
+    "composite": lambda: make_composite("fixed", 3, 3, True),
+    "dry_picture": lambda: make_dry_picture(EVERYTHING, 3),
+    "disperse": lambda: disperse,
+    "filter_picture": lambda: make_filter(True, 3),
     "dry_land": lambda: make_dry_land(EVERYTHING),
     "project_pattern": lambda: make_pattern(
         PatternSpec("smoothstep", shadows=True, split=True, fresnel=True, attenuation="path", colours=3)

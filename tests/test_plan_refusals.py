@@ -85,7 +85,6 @@ def test_the_gather_refuses_a_format_it_cannot_honour(accumulate, receiver):
     ("changes", "message"),
     [
         ({"method": "beems"}, 'did you mean "beam"'),
-        ({"method": "cascaded"}, "not yet"),
         ({"device": "cuda:99"}, "there is no 'cuda:99' here; expected one of cpu"),
         ({"device": "gpu"}, "there is no 'gpu' here"),
         ({"threads": 0}, "threads: expected a whole number of at least 1, got 0"),

@@ -15,7 +15,6 @@ from warp_caustics.scene import (
     IOR_TABLE,
     JERLOV_TABLE,
     METHODS,
-    PLANNED_METHODS,
     ClosedTerrain,
     GatherSettings,
     Map,
@@ -234,10 +233,6 @@ def test_the_heading_counts_the_faults_and_names_what_was_called() -> None:
             {"method": {"gather": {"n": 6}}},
             "method.gather.n: expected an odd whole number of at least 1, got 6",
         ),
-        (
-            {"method": {"cascaded": {}}},
-            f"method.cascaded: not yet in this version, use {quoted(METHODS)}",
-        ),
         ({"name": ""}, 'name: expected a text, got ""'),
     ],
 )
@@ -347,13 +342,8 @@ def test_colour_makes_three_channels() -> None:
     assert scene_with(medium={"ior": "fresh"}).channels == 1  # green alone, without dispersion
 
 
-def test_methods_are_known_not_yet_known_or_unknown() -> None:
+def test_methods_are_known_or_unknown() -> None:
     assert [known_method(name) for name in METHODS] == list(METHODS)
-    for name in PLANNED_METHODS:
-        with pytest.raises(InputError, match=f'^method: expected .*, got "{name}": not yet in this version$'):
-            known_method(name)
-        with pytest.raises(InputError, match="not yet"):
-            Method(name=name)
     with pytest.raises(InputError, match='did you mean "photon"'):
         known_method("foton")
 

@@ -62,7 +62,8 @@ def rasterize_steps(
     does : str
         What it is for, in the words of the plan.
     depth, normals, ids
-        Which G-buffers are made, as for :func:`warp_caustics.g_buffer.rasterize`.
+        Which G-buffers are made, as for :func:`warp_caustics.g_buffer.rasterize`; none leaves ``<into>.visibility`` for
+        the caller to resolve.
     into : str, optional
         Prefix of the buffers that are made, ``<into>.depth``, ``.normal``, ``.id``; the view's if not given.
 
@@ -100,7 +101,7 @@ def rasterize_steps(
             step(lambda: project_vertices_kernel, (vertices,)),
             step(lambda: fill_small_kernel, (triangles,)),
             step(lambda: fill_large_kernel, lambda device: (large_workers(device),)),
-            step(lambda: resolve_kernel(spec), (rows, columns)),
+            *((step(lambda: resolve_kernel(spec), (rows, columns)),) if any(made.values()) else ()),
         ),
         buffers=(
             Buffer(own["screen"], "vec3", (vertices,), 12),

@@ -16,6 +16,7 @@ DTYPES: Mapping[str, Any] = {
     "float16": wp.float16, "float32": wp.float32, "float64": wp.float64, "int32": wp.int32, "int64": wp.int64,
     "uint8": wp.uint8, "uint16": wp.uint16, "uint32": wp.uint32, "uint64": wp.uint64,
     "vec1": FLUX[1], "vec2": wp.vec2, "vec3": FLUX[3], "vec4": wp.vec4, "vec3i": wp.vec3i,
+    "vec2h": wp.vec2h, "vec2s": wp.vec2s,
 }  # fmt: skip
 """Elements of a program's buffers."""
 

@@ -161,9 +161,7 @@ def lattice_triangles(lattice: Lattice, device: str, normals: bool = False) -> T
     rows, columns = lattice.corners
     if rows * columns > np.iinfo(np.int32).max:
         raise InputError(f"a lattice of {rows} x {columns} corners is more than 32-bit indices can name")
-    corner = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
-    triangles = np.stack([a, b, d, a, d, c], axis=-1).reshape(-1, 3)
+    triangles = lattice_indices(rows, columns)
     flat = wp.zeros((rows, columns), dtype=float, device=device)
     result = Triangles(
         wp.empty(rows * columns, dtype=wp.vec3, device=device),
@@ -173,6 +171,13 @@ def lattice_triangles(lattice: Lattice, device: str, normals: bool = False) -> T
     )
     lift_lattice(lattice, flat, result)
     return result
+
+
+def lattice_indices(rows: int, columns: int) -> npt.NDArray[np.int32]:
+    """Corners ``[n, 3]`` of the triangles of a lattice with so many rows and columns of corners."""
+    corner = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+    return np.stack([a, b, d, a, d, c], axis=-1).reshape(-1, 3)
 
 
 def lift_lattice(lattice: Lattice, heights: wp.array, triangles: Triangles) -> None:

@@ -11,6 +11,7 @@ from warp_caustics.errors import InputError
 from warp_caustics.scene import (
     AreaRatioSettings,
     BeamSettings,
+    CascadedSettings,
     DifferentialSettings,
     GatherSettings,
     PatternSettings,
@@ -23,6 +24,7 @@ Settings = (
     BeamSettings
     | PhotonSettings
     | GatherSettings
+    | CascadedSettings
     | SampleSettings
     | PatternSettings
     | AreaRatioSettings
@@ -43,6 +45,9 @@ AREA_RATIO_COUNTS = (1.0, 4.0, 16.0)
 """More cells do not make pixel centres denser."""
 
 DIFFERENTIAL_COUNTS = (1 / 4, 1.0, 4.0)
+
+CASCADE_TEXELS = (256, 512, 1024)
+"""Along a side of each light view; the last is the default."""
 
 PUBLISHED_N = 7
 """Yuksel & Keyser's window; it keeps M = N - 1 neighbours."""
@@ -107,6 +112,10 @@ def _samples(counts: Sequence[int]) -> tuple[Settings, ...]:
     )
 
 
+def _cascades(texels: Sequence[int], **chosen: Any) -> tuple[Settings, ...]:
+    return tuple(CascadedSettings.model_validate({"resolution": n, **chosen}) for n in texels)
+
+
 def _area_ratios(area: str, overlap: str) -> tuple[Settings, ...]:
     return tuple(
         AreaRatioSettings.model_validate({"samples_per_pixel": n, "area": area, "overlap": overlap})
@@ -133,6 +142,16 @@ SERIES: dict[str, tuple[Series, ...]] = {
         Series("photon Eq. 3.3", "photon", _photons(BACKLUND_COUNTS, "cell", "backlund"), "a floor: misplaced light"),
     ),
     "gather": (Series("gather", "gather", (GatherSettings(n=PUBLISHED_N), GatherSettings())),),
+    "cascaded": (
+        Series("cascaded", "cascaded", _cascades(CASCADE_TEXELS)),
+        Series("cascaded Eq. 3.3", "cascaded", _cascades((512,), projection="backlund"), "a floor: misplaced light"),
+        Series(
+            "cascaded published",
+            "cascaded",
+            _cascades((1024,), projection="backlund", footprint="point", blend=0.0, brightness="published"),
+            "none: brightness is a constant",
+        ),
+    ),
     "area_ratio": (
         Series("area_ratio", "area_ratio", _area_ratios("derivatives", "add"), "none: light is invented"),
         Series("area_ratio latest", "area_ratio", _area_ratios("derivatives", "latest"), "none: light is invented"),
@@ -187,5 +206,7 @@ def label(series: Series, settings: Settings, found: Mapping[str, Any]) -> str:
     if isinstance(settings, GatherSettings):
         n = found.get("n", settings.n)
         return series.name + ("" if n is None else f" N={n}") + (" auto" if settings.n is None else "")
+    if isinstance(settings, CascadedSettings):
+        return f"{series.name} {settings.resolution}"
     count = series.count(settings)
     return series.name if count is None else f"{series.name} {Fraction(count).limit_denominator(1000)}"

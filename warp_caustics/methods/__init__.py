@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from .area_ratio import area_ratio
 from .beam import beam
+from .cascaded import cascaded
 from .differential import differential
 from .gather import gather
 from .pattern import pattern
@@ -27,6 +28,7 @@ METHODS: dict[str, Callable[[Facts], Program | Sequence]] = {
     "beam": beam,
     "photon": photon,
     "gather": gather,
+    "cascaded": cascaded,
     "sample": sample,
     "pattern": pattern,
     "area_ratio": area_ratio,

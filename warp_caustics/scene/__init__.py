@@ -1,12 +1,12 @@
 """The scene file: its models, their validation, and loading."""
 
+from warp_caustics.scene.cascaded import CascadedSettings
 from warp_caustics.scene.frame import Camera, Map
 from warp_caustics.scene.light import Medium, Sun
 from warp_caustics.scene.load import bundled_scenes, load_scene, parse_scene
 from warp_caustics.scene.medium_tables import CHANNEL_WAVELENGTHS, IOR_TABLE, JERLOV_TABLE
 from warp_caustics.scene.method import (
     METHODS,
-    PLANNED_METHODS,
     AreaRatioSettings,
     BeamSettings,
     DifferentialSettings,
@@ -28,10 +28,10 @@ __all__ = [
     "IOR_TABLE",
     "JERLOV_TABLE",
     "METHODS",
-    "PLANNED_METHODS",
     "AreaRatioSettings",
     "BeamSettings",
     "Camera",
+    "CascadedSettings",
     "ClosedTerrain",
     "DifferentialSettings",
     "Drop",

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field
 from pydantic_core import PydanticCustomError
 
 from warp_caustics.errors import InputError
-from warp_caustics.scene.faults import quoted
+from warp_caustics.scene.cascaded import CascadedSettings
 from warp_caustics.scene.model import Model
 from warp_caustics.scene.pattern import PatternSettings
 from warp_caustics.scene.values import (
@@ -26,14 +26,13 @@ from warp_caustics.scene.values import (
     whole,
 )
 
-#: The methods of this version, and those that later ones bring.
+#: The methods by name.
 METHODS: Final = (
-    "beam", "photon", "gather", "sample", "pattern", "area_ratio", "differential", "reference",
+    "beam", "photon", "gather", "cascaded", "sample", "pattern", "area_ratio", "differential", "reference",
 )  # fmt: skip
-PLANNED_METHODS: Final = ("cascaded",)
 
 
-METHOD_NAME: Final = one_of(*METHODS, not_yet=PLANNED_METHODS)
+METHOD_NAME: Final = one_of(*METHODS)
 
 
 def known_method(name: str) -> str:
@@ -42,7 +41,7 @@ def known_method(name: str) -> str:
     Raises
     ------
     InputError
-        If there is none of that name, or not yet.
+        If there is none of that name.
     """
     try:
         return str(METHOD_NAME.checked(name))
@@ -190,8 +189,6 @@ class ReferenceSettings(Model):
 class Method(Model):
     """The method and its parameters; the tables of other methods are validated and unused."""
 
-    not_yet: ClassVar[Mapping[str, str]] = {name: f"use {quoted(METHODS)}" for name in PLANNED_METHODS}
-
     name: Annotated[str, METHOD_NAME] = Field(default="beam", description="the default of this scene")
     accumulate: Annotated[Literal["float32", "float64", "fixed"], one_of("float32", "float64", "fixed")] = Field(
         default="float32",
@@ -201,6 +198,7 @@ class Method(Model):
     beam: BeamSettings = Field(default=BeamSettings(), description="parameters of beam")
     photon: PhotonSettings = Field(default=PhotonSettings(), description="parameters of photon")
     gather: GatherSettings = Field(default=GatherSettings(), description="parameters of gather")
+    cascaded: CascadedSettings = Field(default=CascadedSettings(), description="parameters of cascaded")
     area_ratio: AreaRatioSettings = Field(default=AreaRatioSettings(), description="parameters of area_ratio")
     differential: DifferentialSettings = Field(default=DifferentialSettings(), description="parameters of differential")
     pattern: PatternSettings = Field(default=PatternSettings(), description="parameters of pattern")

@@ -1,0 +1,135 @@
+"""From the cascades' pictures to one: per pixel the finest cascade that reaches it, as irradiance on what it sees.
+
+Bäcklund's thesis, 3.5, switches from one cascade to the next at its far plane. With a zone of blending the weights of
+all cascades add up to 1 at every depth, so that the light stays as it is across a border.
+"""
+
+import functools
+
+import warp as wp
+
+from .deposit import ACCUMULATOR
+from .eye_surface import lies_on, pixel_ray
+from .optics import facing
+from .photon import Scene, SunSample, share_lit
+from .project import FAR, make_clearance
+from .spec import Spec
+from .surface import HEIGHT_AND_SLOPE
+from .views import View, unproject
+
+
+@wp.func
+def reaches(depth: float, far: float, zone: float) -> float:
+    """How far a cascade that ends at ``far`` still counts at a depth: 1 before its zone of blending, 0 beyond it."""
+    if depth > far:
+        return 0.0
+    if depth <= far - zone:
+        return 1.0
+    return (far - depth) / zone
+
+
+@wp.func
+def cascade_weight(depth: float, before: wp.vec2, own: wp.vec2) -> float:
+    """Weight of a cascade at a depth; ``before`` and ``own`` are (far, zone) of the finer one and of itself."""
+    return reaches(depth, own[0], own[1]) - reaches(depth, before[0], before[1])
+
+
+@functools.cache
+def make_composite(accumulate: str, channels: int, colours: int, flux: bool) -> wp.Kernel:
+    """Add a cascade to the picture; without ``flux`` its brightness is a constant's and no area divides it."""
+    dtype = ACCUMULATOR[accumulate]
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def composite(
+        # In:
+        light: wp.array[dtype],
+        eye_depth: wp.array2d[float],
+        eye_area: wp.array2d[float],
+        before: wp.vec2,
+        own: wp.vec2,
+        scale: wp.vec3d,
+        # Out:
+        picture_out: wp.array[float],
+    ):
+        """One thread a pixel; launch dims (rows, columns). ``scale`` is the flux of an accumulator's unit by colour."""
+        row, column = wp.tid()
+        depth = eye_depth[row, column]
+        if not wp.isfinite(depth):
+            return
+        weight = cascade_weight(depth, before, own)
+        if weight <= 0.0:
+            return
+        if wp.static(flux):
+            weight /= eye_area[row, column]
+        pixel = row * eye_depth.shape[1] + column
+        for c in range(wp.static(colours)):
+            taken = light[pixel * wp.static(channels) + wp.where(wp.static(channels) == 1, 0, c)]
+            at = pixel * wp.static(colours) + c
+            picture_out[at] = picture_out[at] + float(wp.float64(taken) * scale[c] * wp.float64(weight))
+
+    return composite
+
+
+@functools.cache
+def make_dry_picture(spec: Spec, colours: int) -> wp.Kernel:
+    """Light dry land that the eye sees directly: E max(0, -N . I), unless a hill stands in the sun."""
+    water_at = HEIGHT_AND_SLOPE[spec.water]
+    kind = spec.receiver if spec.receiver in HEIGHT_AND_SLOPE else "waves"
+    terrain_at = HEIGHT_AND_SLOPE[kind]
+    clear_of_land = make_clearance(kind)
+    hills_shade = spec.hills_shade
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def dry_picture(
+        # In:
+        scene: Scene,
+        suns: wp.array[SunSample],
+        eye_view: wp.array[View],
+        eye_depth: wp.array2d[float],
+        eye_plane: wp.array2d[wp.vec4],
+        irradiance: wp.vec3,
+        # Out:
+        picture_out: wp.array[float],
+    ):
+        """One thread a pixel; launch dims (rows, columns)."""
+        row, column = wp.tid()
+        depth = eye_depth[row, column]
+        if not wp.isfinite(depth):
+            return
+        view = eye_view[0]
+        x = float(column) + 0.5
+        y = float(row) + 0.5
+        point = unproject(view, x, y, depth)
+        land = scene.receiver
+        ground = terrain_at(land.terrain, point[0], point[1])
+        if ground[0] < -scene.water.amplitude:
+            return
+        if not lies_on(
+            eye_plane[row, column], wp.vec3(point[0], point[1], ground[0]), wp.vec3(-ground[1], -ground[2], 1.0)
+        ):
+            return  # an object stands there
+        # The pixel's width on the land, across the ray: the shore is filtered over it.
+        width = wp.length(depth * (pixel_ray(view, x + 1.0, y) - pixel_ray(view, x, y)))
+        size = wp.vec2(width, width)
+        water = water_at(scene.water.surface, point[0], point[1])
+        dry = share_lit(ground[0] - water[0], wp.vec2(ground[1] - water[1], ground[2] - water[2]), size)
+        light = float(0.0)
+        for k in range(suns.shape[0]):
+            sun = suns[k].direction
+            direct = dry * wp.max(0.0, facing(sun, wp.vec2(ground[1], ground[2])))
+            if wp.static(hills_shade):
+                if direct > 0.0:
+                    origin = wp.vec3(point[0], point[1], ground[0])
+                    near = clear_of_land(land.terrain, origin, -sun, 1.0, land.slope, land.highest, land.step)
+                    if near[0] < FAR:
+                        hill = terrain_at(land.terrain, origin[0] - near[1] * sun[0], origin[1] - near[1] * sun[1])
+                        direct *= share_lit(near[0], wp.vec2(ground[1] - hill[1], ground[2] - hill[2]), size)
+            light += direct
+        # `facing` is per horizontal area; the eye sees the area of the land itself.
+        light /= wp.sqrt(1.0 + ground[1] * ground[1] + ground[2] * ground[2])
+        pixel = row * eye_depth.shape[1] + column
+        for c in range(wp.static(colours)):
+            at = pixel * wp.static(colours) + c
+            picture_out[at] = picture_out[at] + light * irradiance[c]
+
+    return dry_picture

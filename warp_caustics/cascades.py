@@ -1,0 +1,290 @@
+"""Cascades: the eye's frustum cut at growing far planes, and the view along the sun that lights each part.
+
+Bäcklund's thesis, 3.2.2, after Microsoft's cascaded shadow maps, "fit to scene": sub-frusta share the near plane of
+the eye, and their far planes grow linearly. A light view encloses all water whose light can land in its sub-frustum.
+Its size depends on neither the eye's place nor its direction, and it moves by whole texels of a grid that is fixed in
+the world: a moving eye does not make it shimmer. All here is float64, from the map's origin and the water's level.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .dispersion import CHANNELS, channel_scene
+from .eye import eye_view
+from .receiver import receiver_kind
+from .sun import refract_slopes
+from .views import Float64Array, Projection, light_axes
+from .water import extreme_slopes
+from .window import Reach, refraction_reach
+
+if TYPE_CHECKING:
+    from .facts import Facts
+    from .scene import Camera
+
+CELL_TEXELS = 2
+"""Texels along a side of a lattice cell. A wave is seen as straight chords of that length: a chord's error is that of
+the texels' own, which are no more than points of it, times four, and the triangles are half as many as the texels."""
+
+SNAP_TEXELS = 2
+"""Texels by which a view is wider than what it must hold: snapping moves it by half of one, and edges round."""
+
+INSIDE = 1e-9
+"""Share of a polytope's size by which its corners may lie outside its own planes: a few roundings of float64."""
+
+DETERMINANT = 1e-12
+"""Below it three planes, of unit normals, meet in no point."""
+
+FARTHER = 1e-6
+"""Share by which the last far plane lies behind the farthest that the eye sees: float32 depths round to 6e-8."""
+
+
+@dataclass(frozen=True)
+class Cascade:
+    """What of a cascade stays while the eye moves.
+
+    Attributes
+    ----------
+    far : float
+        Depth at which its sub-frustum ends [m].
+    zone : float
+        Depth before that over which it gives way to the next [m]; 0 for a hard switch.
+    half : float64 [2]
+        Half the width of what is to be lit, across the light [m].
+    texel : float64 [2]
+        Sides of a texel, across the light [m].
+    margin : (int, int)
+        Texels by which the water's lattice is wider on each side: lifted corners are seen elsewhere.
+    ground_margin : (int, int)
+        The same of the ground's.
+    """
+
+    far: float
+    zone: float
+    half: Float64Array
+    texel: Float64Array
+    margin: tuple[int, int]
+    ground_margin: tuple[int, int]
+
+    @property
+    def texel_area(self) -> float:
+        """Area of a texel across the light [m^2]."""
+        return float(self.texel.prod())
+
+    def corners(self, resolution: int, margin: tuple[int, int]) -> tuple[int, int]:
+        """Rows and columns of corners of a lattice over the view."""
+        columns, rows = (-(-(resolution + 2 * m) // CELL_TEXELS) + 1 for m in margin)
+        return rows, columns
+
+
+class Cascades:
+    """The cascades of a scene and its camera.
+
+    Parameters
+    ----------
+    facts : Facts
+        Of a scene with a camera.
+    near, far : float or None
+        Depths [m] between which the far planes are spaced: those of the nearest and the farthest that the scene's
+        camera sees of the scene if not given.
+
+    Attributes
+    ----------
+    cascades : tuple of Cascade
+        From the finest to the widest.
+    resolution : int
+        Texels along a side.
+    near, far : float
+        As resolved [m].
+    origin : (x, y, z)
+        World point that all coordinates are relative to.
+    ground_level : float
+        Plane on which the ground's lattice lies on the texel grid [m].
+    """
+
+    def __init__(
+        self,
+        facts: Facts,
+        count: int,
+        resolution: int,
+        near: float | None = None,
+        far: float | None = None,
+        blend: float = 0.0,
+        backlund: bool = False,
+    ) -> None:
+        scene = facts.scene
+        camera = scene.camera
+        assert camera is not None
+        self.resolution = resolution
+        self.origin = (*scene.map.origin, scene.water.level)
+        self.ground_level = 0.5 * (facts.ground.lowest + min(facts.ground.highest, facts.amplitude))
+        self._amplitude = facts.amplitude
+        self._axes = light_axes(scene.sun.unit_direction)
+        self._low, self._high = scene_box(facts)
+        slopes = extreme_slopes(scene, facts.assets)
+        reaches = [refraction_reach(sun, slopes, ior) for sun in facts.suns for ior in set(iors(facts))]
+        self._pad = self._padding(reaches, backlund, facts.amplitude - facts.ground.lowest)
+        nearest, farthest = self._seen_depths(camera)
+        self.near = nearest if near is None else near
+        self.far = max(farthest * (1.0 + FARTHER) if far is None else far, self.near * (1.0 + FARTHER))
+        fars = self.near + (self.far - self.near) * np.arange(1, count + 1) / count
+        zone = blend * (self.far - self.near) / count
+        swing = (facts.amplitude, 0.5 * (min(facts.ground.highest, facts.amplitude) - facts.ground.lowest))
+        self.cascades = tuple(
+            self._cascade(camera, float(end), zone if i < count - 1 else 0.0, swing) for i, end in enumerate(fars)
+        )
+
+    def projections(self, camera: Camera) -> tuple[Projection, ...]:
+        """Light views of all cascades, for an eye."""
+        return tuple(self._projection(camera, cascade) for cascade in self.cascades)
+
+    def eye(self, camera: Camera) -> Projection:
+        """Projection of the eye."""
+        return eye_view(camera).projection(self.origin)
+
+    def lit_region(self, camera: Camera, far: float) -> Float64Array:
+        """Corners ``[n, 3]`` of the part of the scene that the eye sees up to a depth; empty where it sees none."""
+        planes = np.concatenate([frustum_planes(self.eye(camera), far), box_planes(self._low, self._high)])
+        return polytope_corners(planes)
+
+    def _cascade(self, camera: Camera, far: float, zone: float, swing: tuple[float, float]) -> Cascade:
+        across = self._across(self._box_corners())
+        # No wider than the scene; no wider than a sphere around the sub-frustum, which holds it however it turns.
+        half = np.minimum(frustum_radius(self.eye(camera), far), 0.5 * (across.max(axis=0) - across.min(axis=0)))
+        texel = (2.0 * half + self._pad[1] - self._pad[0]) / (self.resolution - SNAP_TEXELS)
+        lift = np.abs(self._axes[:2, 2]) / texel
+        margins = [tuple(int(m) for m in np.ceil(lift * s) + CELL_TEXELS) for s in swing]
+        return Cascade(far, zone, half, texel, (margins[0][0], margins[0][1]), (margins[1][0], margins[1][1]))
+
+    def _projection(self, camera: Camera, cascade: Cascade) -> Projection:
+        """View whose grid of texels stands still in the world: it is moved by whole texels."""
+        region = self.lit_region(camera, cascade.far)
+        across = self._across(region if len(region) else self._box_corners())
+        middle = 0.5 * (across.min(axis=0) + across.max(axis=0) + self._pad[0] + self._pad[1])
+        first = np.round(middle / cascade.texel - 0.5 * self.resolution)
+        # Depth is 0 where the view's middle meets the water at rest, so that float32 keeps its digits.
+        snapped = (first + 0.5 * self.resolution) * cascade.texel
+        depth = -(snapped @ self._axes[:2, 2]) / self._axes[2, 2]
+        scale = np.array([*(1.0 / cascade.texel), 1.0])
+        return Projection(
+            scale[:, None] * self._axes, np.array([*-first, -depth]), False, -math.inf,
+            (self.resolution, self.resolution), np.array(self.origin),
+        )  # fmt: skip
+
+    def _across(self, points: Float64Array) -> Float64Array:
+        """Coordinates ``[n, 2]`` across the light [m]."""
+        return points @ self._axes[:2].T
+
+    def _box_corners(self) -> Float64Array:
+        return np.array(list(product(*zip(self._low, self._high, strict=True))))
+
+    def _padding(self, reaches: list[Reach], backlund: bool, deepest: float) -> tuple[Float64Array, Float64Array]:
+        """How far across the light water can stand from where its light lands, both ways [m].
+
+        Light lands ``depth * way`` beside its water and ``depth`` below it, the way being bounded by the refraction.
+        """
+        bounds = [(r.low, r.high) for r in reaches]
+        if backlund:
+            bounds += [(r.backlund_low, r.backlund_high) for r in reaches]
+        ways = np.array([(x, y) for low, high in bounds for x in (low[0], high[0]) for y in (low[1], high[1])])
+        up = np.concatenate([-ways, np.ones((len(ways), 1))], axis=1)
+        offsets = np.concatenate([np.zeros((1, 2)), max(deepest, 0.0) * self._across(up)])
+        return offsets.min(axis=0), offsets.max(axis=0)
+
+    def _seen_depths(self, camera: Camera) -> tuple[float, float]:
+        """Depths [m] of the nearest and the farthest that an eye sees of the scene; of all of it if it sees none."""
+        eye = self.eye(camera)
+        corners = self._box_corners()
+        depths = corners @ eye.matrix[2] + eye.offset[2]
+        region = self.lit_region(camera, max(float(depths.max()), 2.0 * eye.near))
+        if len(region):
+            depths = region @ eye.matrix[2] + eye.offset[2]
+        return max(float(depths.min()), eye.near), max(float(depths.max()), 2.0 * eye.near)
+
+
+def iors(facts: Facts) -> tuple[float, float, float]:
+    """Index of refraction of each channel: green's for all without dispersion.
+
+    Raises
+    ------
+    InputError
+        If the strength of the dispersion takes an index to that of air, or below.
+    """
+    if facts.scene.medium.dispersion == "none":
+        return facts.ior, facts.ior, facts.ior
+    red, green, blue = (channel_scene(facts.scene, channel).medium.green_ior for channel in range(len(CHANNELS)))
+    return red, green, blue
+
+
+def backlund_miss(facts: Facts) -> float:
+    """How far off a level floor Eq. 3.3 lands at most [m]: along the ray by too much, and so under the floor.
+
+    The way from water to ground along the light, ``depth / cos``, is projected on the refracted ray; on a floor that
+    slopes it is off by as much again.
+    """
+    sun = facts.scene.sun.unit_direction
+    rays = refract_slopes(sun, extreme_slopes(facts.scene, facts.assets), facts.ior)
+    rays = rays[np.isfinite(rays).all(axis=1)]
+    share = np.abs((rays @ sun) * rays[:, 2] / sun[2] - 1.0).max()
+    slope = facts.ground.slope if np.isfinite(facts.ground.slope) else 1.0
+    return float(share * (1.0 + slope) * max(facts.amplitude - facts.ground.lowest, 0.0))
+
+
+def scene_box(facts: Facts) -> tuple[Float64Array, Float64Array]:
+    """Corners of the box that holds all wet ground which an eye can see: the map's, and that of meshes."""
+    scene, assets = facts.scene, facts.assets
+    low, high = np.zeros(2), np.asarray(scene.map.size, dtype=np.float64)
+    for mesh in (assets.mesh, assets.objects):
+        if mesh is not None:
+            at = mesh.vertices[:, :2] - np.asarray(scene.map.origin)
+            whole = receiver_kind(scene) == "mesh" and mesh is assets.mesh  # it takes the map's place
+            low, high = (at.min(axis=0), at.max(axis=0)) if whole else (
+                np.minimum(low, at.min(axis=0)), np.maximum(high, at.max(axis=0)))  # fmt: skip
+    top = max(min(facts.ground.highest, facts.amplitude), facts.ground.lowest)
+    return np.array([*low, facts.ground.lowest]), np.array([*high, top])
+
+
+def frustum_planes(eye: Projection, far: float) -> Float64Array:
+    """Planes ``[6, 4]`` of an eye's frustum up to a depth: ``n . x + d >= 0`` inside, n of length 1."""
+    columns, rows = eye.resolution
+    x, y, z = np.concatenate([eye.matrix, eye.offset[:, None]], axis=1)
+    end = np.array([0.0, 0.0, 0.0, 1.0])
+    planes = np.stack([x, columns * z - x, y, rows * z - y, z - eye.near * end, far * end - z])
+    return planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+
+
+def box_planes(low: Float64Array, high: Float64Array) -> Float64Array:
+    """Planes ``[6, 4]`` of an upright box."""
+    axes = np.eye(3)
+    return np.concatenate([np.c_[axes, -low], np.c_[-axes, high]])
+
+
+def polytope_corners(planes: Float64Array) -> Float64Array:
+    """Corners ``[n, 3]`` of the convex set inside all planes ``[m, 4]``: where three meet and no other cuts them off.
+
+    A flat set has its corners, too. Twelve planes have 220 triples, fewer than a clipper has lines.
+    """
+    triples = np.array(list(combinations(range(len(planes)), 3)))
+    normals, offsets = planes[triples, :3], planes[triples, 3]
+    meet = np.abs((np.cross(normals[:, 0], normals[:, 1]) * normals[:, 2]).sum(axis=1)) > DETERMINANT
+    points = np.linalg.solve(normals[meet], -offsets[meet][..., None])[..., 0]
+    size = 1.0 + np.abs(points).max(axis=1, initial=0.0)
+    inside = (points @ planes[:, :3].T + planes[:, 3] >= -INSIDE * size[:, None]).all(axis=1)
+    return np.asarray(points[inside])
+
+
+def frustum_radius(eye: Projection, far: float) -> float:
+    """Radius of the least sphere around an eye's frustum up to a depth [m], whichever way it looks.
+
+    Around a pyramid whose edges lean by the angle a from its axis: ``far tan a`` past 45 degrees, else
+    ``far / (2 cos^2 a)``; the piece before the near plane is too small to count.
+    """
+    columns, rows = eye.resolution
+    focal = math.sqrt(abs(np.linalg.det(eye.matrix)))
+    tangent = math.hypot(columns, rows) / (2.0 * focal)
+    return far * (tangent if tangent >= 1.0 else 0.5 * (1.0 + tangent**2))
