@@ -84,9 +84,9 @@ def box_mask(position: wp.vec3) -> float:
 
 
 @wp.func
-def panner(uv: wp.vec2, time: float, speed: wp.float64, tiling: float) -> wp.vec2:
+def panner(uv: wp.vec2, time: wp.float64, speed: wp.float64, tiling: float) -> wp.vec2:
     """``(1, 0) * time * speed + uv * tiling``; whole repeats of the way panned are left out, in float64."""
-    way = wp.float64(time) * speed
+    way = time * speed
     return wp.vec2(float(way - wp.floor(way)), 0.0) + tiling * uv
 
 
@@ -141,7 +141,7 @@ def make_caustics(split: bool) -> wp.Function:
     """Join the two layers by their least: ``min(tex1, tex2) * strength``, by colour."""
 
     @wp.func
-    def caustics(pattern: Pattern, texture: wp.array2d[float], time: float, point: wp.vec3) -> wp.vec3:
+    def caustics(pattern: Pattern, texture: wp.array2d[float], time: wp.float64, point: wp.vec3) -> wp.vec3:
         uv = wp.vec2(wp.dot(point, pattern.right), wp.dot(point, pattern.up))
         uv1 = panner(uv, time, wp.float64(wp.static(FIRST_SPEED)) * pattern.speed, pattern.tiling) + pattern.anchor
         uv2 = panner(uv, time, wp.float64(wp.static(SECOND_SPEED)) * pattern.speed, -pattern.tiling) - pattern.anchor
@@ -197,7 +197,7 @@ def make_pattern(spec: PatternSpec) -> wp.Kernel:
         pattern: Pattern,
         medium: Medium,
         sun: wp.vec3,
-        clock: wp.array[float],
+        clock: wp.array[wp.float64],
         # Out:
         seen_out: wp.array[float],
     ):

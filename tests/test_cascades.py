@@ -118,7 +118,7 @@ def test_a_light_view_is_no_larger_than_the_rasterizer_holds():
 
 
 def test_a_scene_without_a_camera_is_refused():
-    with pytest.raises(wc.InputError, match="method cascaded needs a camera"):
+    with pytest.raises(wc.InputError, match='method "cascaded" needs a camera'):
         wc.make_plan(scene(GENTLE), "cascaded", "cpu", 1)
 
 

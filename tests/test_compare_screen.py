@@ -98,3 +98,19 @@ def test_each_front_has_its_own_rows():
     marked = with_fronts(rows, Truth(SimpleNamespace(error_bar=0.0), SimpleNamespace(error_bar=0.0)))
     assert [one.on_front for one in marked] == [True, False, False]
     assert [one.on_screen_front for one in marked] == [False, True, False]
+
+
+def test_a_camera_that_sees_nothing_of_the_map_is_told(what, device, monkeypatch):
+    """There is no error to show, and a row of dashes would not say why."""
+    from warp_caustics.comparison import measure, rows
+    from warp_caustics.comparison.settings import series_of, with_settings
+    from warp_caustics.comparison.trials import Trial
+
+    away = what.model_copy(update={"camera": what.camera.model_copy(update={"target": (1.0, -3.0, 4.0)})})
+    seen = carried(away, np.ones((48, 64)), device)
+    assert not seen.irradiance.size
+    (series,) = series_of(away, "pattern")
+    trial = Trial(series, series.settings[0], "pattern", with_settings(away, "pattern", series.settings[0]), None, True)
+    monkeypatch.setattr(measure, "measure", lambda *_: SimpleNamespace(result=SimpleNamespace(caustic_map=None)))
+    row = rows.measured_row(trial, Truth(SimpleNamespace(error_bar=0.0), seen), device, 1, 0.0)
+    assert row.status == "refused" and row.reason == rows.UNSEEN

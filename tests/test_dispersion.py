@@ -5,8 +5,10 @@ import pytest
 from scenery import GENTLE, assert_adds_up, render, scene
 
 import warp_caustics as wc
+from warp_caustics.assets import load_assets
 from warp_caustics.dispersion import channel_scene, own_channel
 from warp_caustics.errors import InputError
+from warp_caustics.facts import gather_facts, with_placed_water
 from warp_caustics.reference import jittered_photons, make_reference
 
 LOW_SUN = (1.7, 0.4, -1.0)
@@ -117,3 +119,32 @@ def test_a_sea_without_dispersion_is_mono_and_says_so(device):
         "green's" in note for note in wc.make_plan(scene(GENTLE, medium={"ior": "sea"}), "beam", device).warnings
     )
     assert not wc.make_plan(scene(GENTLE, medium=SEA), "beam", device).warnings
+
+
+DROPS = {
+    "kind": "grid",
+    "cell": 0.04,
+    "drops": [{"time": 0.0, "position": (1.0, 0.5), "radius": 0.15, "amplitude": 0.02}],
+}
+
+
+def test_channels_of_simulated_water_are_lit_through_one_water(device):
+    """Where the rectangle follows from the light, it is that of all channels together."""
+    what = scene(direction=LOW_SUN, medium=SEA, simulation=DROPS)
+    plans = wc.make_plan(what, "photon", device, threads=1).plans
+    assert len({(plan.facts.basin.origin, plan.facts.basin.size, plan.facts.basin.step) for plan in plans}) == 1
+    apart = render(what, "photon", device, time=0.3)
+    placed = {**DROPS, "origin": plans[0].facts.basin.origin, "size": plans[0].facts.basin.size}
+    blue = scene(direction=LOW_SUN, medium={"ior": what.medium.ior_by_channel[2]}, simulation=placed)
+    assert np.allclose(apart.caustic_map[..., 2], render(blue, "photon", device, time=0.3).caustic_map, rtol=SAME)
+
+
+def test_a_rectangle_that_is_written_down_stays_when_the_map_is_finer():
+    """The disk's directions, and so the rectangle, follow the pixels; two resolutions need one water."""
+    what = scene(simulation=DROPS, sun={"angular_diameter": 3.0}, direction=LOW_SUN)
+    assets = load_assets(what)
+    placed = with_placed_water(what, assets)
+    basins = [gather_facts(one, assets).basin for one in (what, placed, placed.at_resolution(160, 112))]
+    assert all(basin.origin == basins[0].origin and basin.size == basins[0].size for basin in basins)
+    assert gather_facts(what.at_resolution(160, 112), assets).basin.size != basins[0].size
+    assert with_placed_water(placed, assets) is placed

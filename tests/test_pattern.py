@@ -16,7 +16,7 @@ from warp_caustics.assets.textures import load_texture
 from warp_caustics.errors import InputError
 from warp_caustics.eye import eye_view
 from warp_caustics.pattern_texture import TILE_PIXELS, mean_of_least, rendered_tile
-from warp_caustics.scene import Camera
+from warp_caustics.scene import Camera, PatternSettings
 
 # Float32 positions to 1e-6 of a metre, on a texture that changes by a texel in 0.1 m.
 SEEN = 2e-4
@@ -48,6 +48,13 @@ def linear(levels):
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)
 
 
+def fitting(settings):
+    """Leave out a strength that the mask does not take, which is refused."""
+    if settings.get("luminance_mask", "shadow") in ("none", "shadow"):
+        return {name: value for name, value in settings.items() if name != "luminance_strength"}
+    return settings
+
+
 def scene(texture, receiver=TERRAIN, more=None, **changed):
     """Terrain that rises from the water, seen by a camera, far from the world's origin."""
     return scene_of(
@@ -57,7 +64,7 @@ def scene(texture, receiver=TERRAIN, more=None, **changed):
         resolution=(16, 16),
         level=1.0,
         camera=EYE,
-        method={"pattern": {"texture": texture, **SETTINGS, **(more or {})}},
+        method={"pattern": fitting({"texture": texture, **SETTINGS, **(more or {})})},
         **changed,
     )
 
@@ -288,3 +295,20 @@ def test_the_own_tile_has_no_seam(device):
         assert 0.0 < seam.max() <= np.delete(jumps, -1, axis=axis).max()
         np.testing.assert_allclose(seam.mean(), jumps.mean(), rtol=0.5)
     np.testing.assert_allclose(tile.mean(), 1.0, rtol=1e-5)
+
+
+def test_a_strength_that_no_mask_takes_is_refused():
+    with pytest.raises(InputError, match='expected no luminance_strength with luminance_mask "shadow"'):
+        PatternSettings(luminance_strength=0.3)
+    assert PatternSettings(luminance_mask="lerp", luminance_strength=0.3).luminance_strength == 0.3
+
+
+def test_it_moves_as_late_as_at_first(device, texture):
+    """A step of the clock that float32 would not see at a million seconds."""
+    renderer = wc.Renderer(scene(texture), "pattern", device)
+
+    def moved(at):
+        frames = [renderer.render(at + step).screen_map.numpy().copy() for step in (0.0, 1.0 / 60.0)]
+        return np.abs(frames[1] - frames[0]).max()
+
+    assert moved(1e6) > 0.2 * moved(0.0) > 0.0

@@ -44,7 +44,7 @@ def samples(
 
 
 @wp.kernel(enable_backward=False)
-def panned(uv: wp.array[wp.vec2], time: float, speed: wp.float64, tiling: float, uv_out: wp.array[wp.vec2]):
+def panned(uv: wp.array[wp.vec2], time: wp.float64, speed: wp.float64, tiling: float, uv_out: wp.array[wp.vec2]):
     i = wp.tid()
     uv_out[i] = panner(uv[i], time, speed, tiling)
 

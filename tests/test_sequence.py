@@ -22,9 +22,9 @@ EYE = {"position": [0.5, -1.0, 2.0], "target": [0.5, 0.5, 0.0], "vertical_fov": 
 
 
 @wp.kernel(enable_backward=False)
-def add_clock(clock: wp.array[float], amount: float, total_out: wp.array[float]):
+def add_clock(clock: wp.array[wp.float64], amount: float, total_out: wp.array[float]):
     i = wp.tid()
-    total_out[i] = total_out[i] + clock[0] + amount
+    total_out[i] = total_out[i] + float(clock[0]) + amount
 
 
 @wp.kernel(enable_backward=False)
@@ -69,7 +69,7 @@ def looking(facts):
         screen_map="seen",
         uploads={
             **eye.uploads,
-            **mesh_uploads("ground", lambda device: mesh_triangles(*meshes, origin=origin, device=device)),
+            **mesh_uploads("ground", counts, lambda device: mesh_triangles(*meshes, origin=origin, device=device)),
         },
         views=lambda camera: {"eye.view": view_array(eye_view(camera).projection(origin))},
         samples=rows * columns,
@@ -111,6 +111,7 @@ def test_a_camera_is_rasterized_and_moved_without_a_new_renderer(device, method)
         assert np.array_equal(seen, rasterize(triangles, eye_view(camera)).depth.numpy())
     assert np.isfinite(seen).any()
     result = renderer.result()
+    assert result.scene.camera == moved and wc.Renderer(scene, "photon", device).result().scene.camera == scene.camera
     assert result.caustic_map is None and result.surface_irradiance is None
     assert np.array_equal(result.screen_map, seen)
     assert next(reason for reason in renderer.plan.reasons if reason.what == "camera").kept
@@ -142,7 +143,7 @@ def test_what_a_camera_sees_is_saved_as_it_is(device, method, tmp_path):
     assert wc.load_map(tmp_path / "seen.exr").shape == (16, 24)
 
 
-@pytest.mark.parametrize("name", ["pattern", "sample"])
+@pytest.mark.parametrize("name", ["cascaded", "pattern", "sample"])
 def test_a_plan_counts_every_array_that_is_made(device, name):
     renderer = wc.Renderer(scene_of(camera=EYE), name, device)
     planned = {buffer.name: buffer.bytes for buffer in renderer.plan.program.own_buffers(renderer.plan.facts)}

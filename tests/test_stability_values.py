@@ -93,7 +93,7 @@ def spoiled(renderer, bad):
     """Render a frame before and after one node of the water's height map is no number."""
     renderer.render()
     before = renderer.result()
-    nodes = renderer._state.scene.water.surface.grid.nodes
+    nodes = renderer._states[0].scene.water.surface.grid.nodes
     values = nodes.numpy()
     values[36, 30, 0] = bad
     nodes.assign(values)
@@ -125,7 +125,7 @@ def test_a_height_that_is_no_number_darkens_its_own_pixels(device, method, shore
 @pytest.mark.parametrize("method", METHODS)
 def test_water_that_is_no_number_anywhere_is_dropped_whole(device, method):
     renderer = wc.Renderer(scene(GENTLE), method, device, threads=1)
-    renderer._state._host_waves.numpy()["amplitude"][1] = np.nan
+    renderer._states[0]._host_waves.numpy()["amplitude"][1] = np.nan
     renderer.render()
     result = renderer.result()
     assert not result.caustic_map.any()

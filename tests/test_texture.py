@@ -351,3 +351,35 @@ def test_an_atlas_needs_powers_of_two():
 def test_a_method_that_mirrors_the_water_makes_no_tile():
     with pytest.raises(wc.InputError, match='method "sample": mirrors the water'):
         tiled(tile(), "sample")
+
+
+# --- methods that look -----------------------------------------------------------------------------------------------
+
+EYE = {"position": (0.5, -1.0, 2.0), "target": (0.5, 0.5, 0.0), "vertical_fov": 50.0, "resolution": (32, 16)}
+
+
+def test_a_pattern_loops_by_its_own_speed(device):
+    made = wc.make_texture(scene(WAVES, camera=EYE), tile=False, loop=10.0, fps=0.2, method="pattern")
+    (change,) = made.changes
+    assert change.key == "method.pattern.speed" and change.after == (0.4,)
+    assert made.scene.water == scene(WAVES).water and made.resolution == (32, 16)
+    renderer = wc.Renderer(made.scene, "pattern", device)
+    first, half, last = (renderer.render(time).screen_map.numpy().copy() for time in (0.0, 5.0, 10.0))
+    assert np.abs(last - first).max() < 1e-5 < np.abs(half - first).max()
+    with pytest.raises(wc.InputError, match=r"method\.pattern\.speed is 0"):
+        looping(scene(WAVES, method={"pattern": {"speed": 0.0}}), 2.0, "pattern")
+
+
+def test_what_a_camera_sees_is_no_tile():
+    with pytest.raises(wc.InputError, match="a tile is a map in plan view"):
+        wc.make_texture(scene(WAVES, camera=EYE), method="pattern")
+
+
+def test_a_loop_past_the_last_time_is_refused_before_any_frame():
+    with pytest.raises(wc.InputError, match="time"):
+        wc.make_texture(tile(), loop=2.0, fps=1.0, start=999_999_999.5)
+
+
+def test_an_atlas_that_does_not_fit_is_refused():
+    with pytest.raises(wc.InputError, match=r"atlas: 3600 frames of 16384 x 16384 pixels take [0-9,]+ bytes"):
+        FlipBook(3600, (16384, 16384), 3)

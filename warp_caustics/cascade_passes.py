@@ -17,7 +17,7 @@ from .kernels.filter import make_filter
 from .kernels.light_g_buffer import make_light_lattice, make_store_texel
 from .program import ACCUMULATOR_BYTES, Buffer
 from .screen import receiver_meshes
-from .sequence import Fill, Lane, Step
+from .sequence import Fill, Lane, Step, Upload
 
 if TYPE_CHECKING:
     from .facts import Facts
@@ -95,7 +95,11 @@ def eye_passes(layout: Layout) -> Passes:
 
         return mesh_triangles(*meshes, origin=layout.cascades.origin, device=device)
 
-    return (*raster.steps, surface), (*raster.buffers, *buffers), {**raster.uploads, **mesh_uploads("receiver", upload)}
+    return (
+        (*raster.steps, surface),
+        (*raster.buffers, *buffers),
+        {**raster.uploads, **mesh_uploads("receiver", counts, upload)},
+    )
 
 
 def cascade_passes(layout: Layout, number: int, cascade: Cascade) -> Passes:
@@ -141,12 +145,10 @@ def _lattice(layout: Layout, prefix: str, of: str, kind: str, cascade: Cascade, 
     buffers = [Buffer(f"{mesh}.vertices", "vec3", (vertices,), 12)]
     if not ground:
         buffers.append(Buffer(f"{mesh}.normals", "vec3", (vertices,), 12))
-    drawn = _draw(layout, prefix, of, (vertices, triangles))
-    return Rasterized(
-        (lift, *drawn.steps),
-        (*buffers, *drawn.buffers),
-        {**drawn.uploads, f"{mesh}.triangles": functools.partial(_lattice_triangles, rows, columns)},
-    )
+    shared = f"lattice{columns}x{rows}.triangles"  # cascades whose lattices are alike share them
+    drawn = _draw(layout, prefix, of, (vertices, triangles), shared=shared)
+    upload = Upload(Buffer(shared, "vec3i", (triangles,), 12), functools.partial(_lattice_triangles, rows, columns))
+    return Rasterized((lift, *drawn.steps), (*buffers, *drawn.buffers), {**drawn.uploads, shared: upload})
 
 
 def _mesh_ground(layout: Layout, prefix: str) -> Rasterized:
@@ -156,19 +158,23 @@ def _mesh_ground(layout: Layout, prefix: str) -> Rasterized:
     return _draw(layout, prefix, "ground", counts, mesh="receiver")
 
 
-def _draw(layout: Layout, prefix: str, of: str, counts: tuple[int, int], mesh: str | None = None) -> Rasterized:
+def _draw(
+    layout: Layout, prefix: str, of: str, counts: tuple[int, int], mesh: str | None = None, shared: str | None = None
+) -> Rasterized:
     """Plan the rasterization of a mesh into a light view, and what its texels store."""
     texels, settings = layout.texels, layout.settings
     own = f"{prefix}.{of}"
     mesh = mesh or own
-    raster = rasterize_steps(prefix, mesh, counts, texels, does=f"the {of}, as the sun sees it", depth=False, into=own)
+    raster = rasterize_steps(
+        prefix, mesh, counts, texels, does=f"the {of}, as the sun sees it", depth=False, into=own, shared=shared
+    )
     storage = "none" if of == "ground" else settings.normals
     store = Step(
         f"store {of}", f"position{'' if of == 'ground' else ' and normal'} of each texel",
         lambda: make_store_texel(settings.positions, storage), texels,
         {
             "light_view": f"{prefix}.view", "visibility": f"{own}.visibility", "screen": f"{own}.screen",
-            "triangles": f"{mesh}.triangles", "normals": None if of == "ground" else f"{mesh}.normals",
+            "triangles": shared or f"{mesh}.triangles", "normals": None if of == "ground" else f"{mesh}.normals",
             "position": f"{own}_position", "normal": None if of == "ground" else f"{own}_normal",
         },
     )  # fmt: skip
@@ -238,9 +244,8 @@ def composite_passes(layout: Layout) -> tuple[Lane, tuple[Buffer, ...]]:
     return tuple(steps), tuple(layout.picture_buffer(name) for name in names)
 
 
-@functools.lru_cache(maxsize=2)
 def _lattice_triangles(rows: int, columns: int, device: str) -> Any:
-    """Triangles of a lattice of so many corners; cascades whose lattices are alike share them."""
+    """Triangles of a lattice of so many corners."""
     import warp as wp
 
     from .triangles import lattice_indices

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
 from .program import Buffer
-from .sequence import Fill, Lane, Step
+from .sequence import Fill, Lane, Step, Upload
 from .views import EyeView
 
 if TYPE_CHECKING:
@@ -44,6 +44,7 @@ def rasterize_steps(
     normals: Normals | None = None,
     ids: bool = False,
     into: str | None = None,
+    shared: str | None = None,
 ) -> Rasterized:
     """Plan the launches that rasterize a mesh as a view sees it.
 
@@ -66,6 +67,8 @@ def rasterize_steps(
         the caller to resolve.
     into : str, optional
         Prefix of the buffers that are made, ``<into>.depth``, ``.normal``, ``.id``; the view's if not given.
+    shared : str, optional
+        Name of the mesh's triangles where several meshes have the same; ``<mesh>.triangles`` if not given.
 
     Returns
     -------
@@ -80,7 +83,7 @@ def rasterize_steps(
     (columns, rows), (vertices, triangles) = resolution, counts
     own = {name: f"{into}.{name}" for name in ("screen", "visibility", "large", "ends", "tally", "dropped", "workers")}
     bind: dict[str, str | None] = {
-        **own, "view": f"{view}.view", "vertices": f"{mesh}.vertices", "triangles": f"{mesh}.triangles",
+        **own, "view": f"{view}.view", "vertices": f"{mesh}.vertices", "triangles": shared or f"{mesh}.triangles",
         "normals": f"{mesh}.normals" if normals == "vertex" else None,
     }  # fmt: skip
     made = {"depth": depth, "normal": normals is not None, "id": ids}
@@ -151,22 +154,18 @@ def view_array(projection: Projection) -> Any:
     return wp.array([device_view(projection)], dtype=View, device="cpu")
 
 
-def mesh_buffers(prefix: str, counts: tuple[int, int]) -> tuple[Buffer, ...]:
-    """Buffers that :func:`mesh_uploads` brings, for a mesh of so many vertices and triangles."""
-    vertices, triangles = counts
-    return (
-        Buffer(f"{prefix}.vertices", "vec3", (vertices,), 12),
-        Buffer(f"{prefix}.triangles", "vec3i", (triangles,), 12),
-    )
-
-
-def mesh_uploads(prefix: str, make: Callable[[str], Triangles]) -> dict[str, Callable[[str], Any]]:
-    """Uploads of a mesh that keeps its place; ``make`` puts it on a device and is called once.
+def mesh_uploads(prefix: str, counts: tuple[int, int], make: Callable[[str], Triangles]) -> dict[str, Upload]:
+    """Uploads of a mesh of so many vertices and triangles; ``make`` puts it on a device and is called once.
 
     The parts of a mesh come from one call, so that what is uploaded twice is not made twice.
     """
     made = functools.cache(make)
+    vertices, triangles = counts
     return {
-        f"{prefix}.vertices": lambda device: made(device).vertices,
-        f"{prefix}.triangles": lambda device: made(device).triangles,
+        f"{prefix}.vertices": Upload(
+            Buffer(f"{prefix}.vertices", "vec3", (vertices,), 12), lambda device: made(device).vertices
+        ),
+        f"{prefix}.triangles": Upload(
+            Buffer(f"{prefix}.triangles", "vec3i", (triangles,), 12), lambda device: made(device).triangles
+        ),
     }

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .dispersion import CHANNELS, channel_scene
 from .kernels.spec import Spec
 from .receiver import SHALLOWEST, Bounds, check_covered, receiver_bounds, receiver_kind, rest_depth
 from .simulation.basin import Basin, make_basin
@@ -150,6 +151,25 @@ def gather_facts(scene: Scene, assets: Assets) -> Facts:
         basin=basin,
         warnings=tuple(warnings),
     )
+
+
+def with_placed_water(scene: Scene, assets: Assets) -> Scene:
+    """Return the scene with its simulation's rectangle written down.
+
+    A rectangle that follows from the light differs with its colour and with the map's resolution: scenes that are to
+    be one water, as the channels of a dispersed one, are made from this.
+    """
+    simulation = scene.water.simulation
+    if simulation is None or simulation.size is not None:
+        return scene
+    channels = range(len(CHANNELS)) if scene.medium.dispersion != "none" else ()
+    scenes = [channel_scene(scene, channel) for channel in channels] or [scene]
+    basins = [gather_facts(one, assets).basin for one in scenes]
+    origins = np.array([basin.origin for basin in basins if basin is not None])
+    ends = np.array([np.add(basin.origin, basin.size) for basin in basins if basin is not None])
+    origin, size = origins.min(axis=0), ends.max(axis=0) - origins.min(axis=0)
+    placed = simulation.model_copy(update={"origin": tuple(origin.tolist()), "size": tuple(size.tolist())})
+    return scene.model_copy(update={"water": scene.water.model_copy(update={"simulation": placed})})
 
 
 def _deviation(

@@ -6,7 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .capacity import SPARE_MEMORY
+from .device import free_memory
 from .errors import InputError
+
+FLOAT_BYTES = 4
 
 
 class FlipBook:
@@ -31,7 +35,8 @@ class FlipBook:
     Raises
     ------
     InputError
-        If a frame's sides are no powers of two: then no such picture is full of whole frames.
+        If a frame's sides are no powers of two, so that no such picture is full of whole frames, or if it would not fit
+        in memory.
     """
 
     def __init__(self, frames: int, resolution: Sequence[int], colours: int) -> None:
@@ -43,6 +48,12 @@ class FlipBook:
         self.frames, self.resolution = frames, tuple(resolution)
         self.grid = _grid(frames, resolution)
         columns, rows = (cells * side for cells, side in zip(self.grid, resolution, strict=True))
+        needed, free = FLOAT_BYTES * columns * rows * colours, free_memory("cpu")
+        if needed > SPARE_MEMORY * free:
+            raise InputError(
+                f"atlas: {frames} frames of {resolution[0]} x {resolution[1]} pixels take {needed:,} bytes, and "
+                f"{free:,} are free; expected fewer frames, or a smaller map"
+            )
         self.image = np.zeros((rows, columns) if colours == 1 else (rows, columns, colours), dtype=np.float32)
 
     def put(self, index: int, frame: np.ndarray) -> None:

@@ -10,7 +10,7 @@ from .assets import load_assets
 from .capacity import SPARE_MEMORY, check_map_fits, check_work, too_large
 from .dispersion import CHANNELS, DispersedPlan, channel_scene
 from .errors import InputError
-from .facts import Facts, gather_facts
+from .facts import Facts, gather_facts, with_placed_water
 from .magnitude import check_asset_magnitudes, check_magnitudes
 from .methods import DISPERSING, METHODS
 from .program import Buffer, Program
@@ -213,6 +213,7 @@ def _plan_by_channel(facts: Facts, name: str, room: Room) -> DispersedPlan:
             f'medium.dispersion = "post" is not for method "{name}", which does not splat into a camera\'s pixels; '
             f'expected "traced", or method {quoted(DISPERSING)}'
         )
+    scene = with_placed_water(scene, facts.assets)
     plans = [_plan(gather_facts(channel_scene(scene, c), facts.assets), name, room) for c in range(3)]
     if not isinstance(plans[0].program, Program):
         raise InputError(f'medium.dispersion = "{scene.medium.dispersion}": method "{name}" refracts no light')
@@ -235,6 +236,8 @@ def _plan(facts: Facts, name: str, room: Room) -> Plan:
 
 
 def _buffers(facts: Facts, program: Program | Sequence) -> tuple[Buffer, ...]:
+    if isinstance(program, Sequence) and not program.meets_scene:
+        return program.own_buffers(facts)
     buffers = [*program.own_buffers(facts), Buffer("suns", "SunSample", (len(facts.suns),), SUN_BYTES)]
     if facts.waves:
         buffers.append(Buffer("waves", "Wave", (facts.waves,), WAVE_BYTES))

@@ -84,9 +84,10 @@ class Renderer:
             raise InputError("method: a reference is converged anew for each frame; use warp_caustics.render(...)")
         self.plan: Plan | DispersedPlan = plan
         self._states: list[SceneState] = []
+        self._camera: Camera | None = None  # where it was moved to
         # Pinned on the host, so that the copy can be part of a captured frame.
-        self._host_clock = wp.zeros(1, dtype=wp.float32, device="cpu", pinned=plan.device != "cpu")
-        self._clock = wp.zeros(1, dtype=wp.float32, device=plan.device)
+        self._host_clock = wp.zeros(1, dtype=wp.float64, device="cpu", pinned=plan.device != "cpu")
+        self._clock = wp.zeros(1, dtype=wp.float64, device=plan.device)
         start = perf_counter()
         self._recording = self._record()
         self.compile_seconds = perf_counter() - start
@@ -125,7 +126,9 @@ class Renderer:
         return Frame(self._recording.caustic_map, self._recording.screen_map, time)
 
     def look_from(self, camera: Camera) -> None:
-        """Move the camera of a method that looks; the next frame is seen from there. Allocates nothing.
+        """Move the camera of a method that looks; the next frame is seen from there.
+
+        Allocates nothing on the device.
 
         Raises
         ------
@@ -141,6 +144,7 @@ class Renderer:
                 f"{list(camera.resolution)}"
             )
         self._recording.look_from(camera)
+        self._camera = camera
 
     def result(self) -> Result:
         """Read back the last frame; render the one at time 0 first if there is none."""
@@ -152,7 +156,7 @@ class Renderer:
         facts, recording = self.plan.facts, self._recording
         waters = [state.simulated for state in self._states if state.simulated is not None]
         return Result(
-            scene=facts.scene,
+            scene=facts.scene if self._camera is None else facts.scene.model_copy(update={"camera": self._camera}),
             method=self.plan.method,
             device=self.plan.device,
             time=self._time or 0.0,
@@ -162,7 +166,7 @@ class Renderer:
             seconds=self._seconds + waited,
             assets=facts.assets,
             own_screen_map=_read(recording.screen_map),
-            notes=waters[0].warnings() if waters else (),
+            notes=tuple(dict.fromkeys(note for water in waters for note in water.warnings())),
         )
 
     def _record(self) -> Recording:

@@ -60,6 +60,12 @@ class Change:
         return f"{self.key}: {_shown(self.before)} to {_shown(self.after)} ({self.note})"
 
 
+PANS = "pattern"
+"""The method that moves a picture, and does not look at the waves."""
+
+PATTERN_REPEATS = 4.0
+"""Repeats of its texture after which both layers are where they were: they move by 1 and by 0.75 times its speed."""
+
 MIRRORS = "sample"
 """The method that takes the water beyond the map for its mirror image."""
 
@@ -112,7 +118,7 @@ def tiled(scene: Scene, method: str | None = None, rounding: bool = False) -> tu
     return scene.model_copy(update={"water": water, "receiver": receiver, "method": settings}), tuple(fit.changes)
 
 
-def looping(scene: Scene, seconds: float) -> tuple[Scene, tuple[Change, ...]]:
+def looping(scene: Scene, seconds: float, method: str | None = None) -> tuple[Scene, tuple[Change, ...]]:
     """Make a scene whose water is after a time as it was before: every wave then runs a whole number of its periods.
 
     Frequencies that follow from the dispersion relation are taken at the scene's depth, moved to the nearest multiple
@@ -124,6 +130,8 @@ def looping(scene: Scene, seconds: float) -> tuple[Scene, tuple[Change, ...]]:
         Water of waves, or of a spectrum that can loop.
     seconds : float
         T, the length of the loop [s].
+    method : str, optional
+        The method that will make the frames; that of the scene if not given. A pattern moves by a speed of its own.
 
     Returns
     -------
@@ -139,6 +147,8 @@ def looping(scene: Scene, seconds: float) -> tuple[Scene, tuple[Change, ...]]:
     """
     if not 0.0 < seconds < math.inf:
         raise InputError(f"loop: expected a finite number of seconds above 0, got {seconds}")
+    if (scene.method.name if method is None else method) == PANS:
+        return _looping_pattern(scene, seconds)
     water = _with_waves(scene)
     if water.spectrum is not None:
         return _looping_sea(scene, water.spectrum, seconds)
@@ -249,6 +259,21 @@ def _with_waves(scene: Scene) -> Water:
     if scene.water.preset is None or is_radial(scene):
         return scene.water
     return scene.water.model_copy(update={"preset": None, "waves": scene.waves})
+
+
+def _looping_pattern(scene: Scene, seconds: float) -> tuple[Scene, tuple[Change, ...]]:
+    """Move a pattern's speed to the nearest at which it loops; one that moves keeps moving."""
+    settings = scene.method.pattern
+    if settings.speed == 0.0:
+        raise InputError("loop: method.pattern.speed is 0, so one frame is all there is; leave the loop out")
+    rounds = math.copysign(max(1.0, round(abs(settings.speed) * seconds / PATTERN_REPEATS)), settings.speed)
+    speed = PATTERN_REPEATS * rounds / seconds
+    if abs(speed - settings.speed) <= EXACT * abs(settings.speed):
+        return scene, ()
+    note = f"speed {_percent(speed / settings.speed - 1.0)}"
+    moved = scene.method.model_copy(update={"pattern": settings.model_copy(update={"speed": speed})})
+    change = Change("method.pattern.speed", (settings.speed,), (speed,), note)
+    return scene.model_copy(update={"method": moved}), (change,)
 
 
 def _endings(scene: Scene, method: str) -> Iterator[str]:

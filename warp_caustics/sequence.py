@@ -52,6 +52,26 @@ class Fill:
     value: Any = 0
 
 
+@dataclass(frozen=True)
+class Upload:
+    """An array that is made once on a device, and what it takes there.
+
+    Attributes
+    ----------
+    buffer : Buffer
+        Its name, type and shape, so that a plan counts it.
+    make : callable
+        Makes it on a device.
+    """
+
+    buffer: Buffer
+    make: Callable[[str], Any]
+
+    def __call__(self, device: str) -> Any:
+        """Make the array."""
+        return self.make(device)
+
+
 Lane = tuple[Step | Fill, ...]
 """Launches in order."""
 
@@ -69,12 +89,10 @@ class Sequence:
     caustic_map, screen_map : str or None
         The float32 buffers that hold the frame, ``[rows * columns * colours]``; None for what is not made.
     values : mapping
-        Plain parameters of the kernels, by name. ``scene``, ``suns`` and ``clock`` (float32 ``[1]``, the frame's time)
+        Plain parameters of the kernels, by name. ``scene``, ``suns`` and ``clock`` (float64 ``[1]``, the frame's time)
         are there without being named.
     uploads : mapping
-        By name, functions of a device that make an array or struct, once.
-    uploaded : tuple of Buffer
-        The arrays among the uploads, so that their bytes are counted.
+        By name, functions of a device that make a struct or number, once, or an :class:`Upload` that makes an array.
     views : callable, optional
         From a camera to host arrays by name: what follows the camera, copied again when it moves.
     settings : mapping
@@ -83,6 +101,8 @@ class Sequence:
         What is kept and left out, and why; the scene's own where the method follows light as the scene says.
     warnings : tuple of str
         What a user should know of the method before trusting what it makes.
+    meets_scene : bool
+        Whether any kernel asks for ``scene`` or ``suns``, so that what they point to is made, and counted.
     follows_water : bool
         Whether the waves are looked at; if not, none are simulated.
     samples : int
@@ -97,11 +117,11 @@ class Sequence:
     screen_map: str | None = None
     values: Mapping[str, Any] = field(default_factory=dict)
     uploads: Mapping[str, Callable[[str], Any]] = field(default_factory=dict)
-    uploaded: tuple[Buffer, ...] = ()
     views: Callable[[Camera], Mapping[str, Any]] | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     reasons: tuple[Reason, ...] | None = None
     warnings: tuple[str, ...] = ()
+    meets_scene: bool = True
     follows_water: bool = True
     samples: int = 0
     energy: Callable[[Mapping[str, Any]], Energy] | None = None
@@ -131,7 +151,8 @@ class Sequence:
 
     def own_buffers(self, facts: Facts) -> tuple[Buffer, ...]:
         """Buffers of the method."""
-        return (*self.buffers, *self.uploaded)
+        uploaded = (upload.buffer for upload in self.uploads.values() if isinstance(upload, Upload))
+        return (*self.buffers, *uploaded)
 
     def work(self, facts: Facts) -> int:
         """Photons or pixels in a frame."""

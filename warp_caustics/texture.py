@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import InputError
 from .repeat import Change, looping, tiled
-from .scene import Scene, load_scene
+from .scene import Scene, known_method, load_scene
+from .scene.method import SCREEN_SPACE
+from .water import check_time
 
 if TYPE_CHECKING:
     import numpy as np
@@ -49,6 +51,8 @@ class Texture:
         Time of the first one [s].
     changes : tuple of Change
         What was moved.
+    method : str
+        That renders it.
     """
 
     scene: Scene
@@ -57,25 +61,22 @@ class Texture:
     frames: int
     start: float
     changes: tuple[Change, ...]
+    method: str
+
+    @property
+    def resolution(self) -> tuple[int, int]:
+        """Columns and rows of a frame."""
+        camera = self.scene.camera
+        return camera.resolution if self.method in SCREEN_SPACE and camera is not None else self.scene.map.resolution
 
     def time(self, index: int) -> float:
         """Time of a frame, counted from 0 [s]."""
         return self.start + (self.loop or 0.0) * index / self.frames
 
     def results(self, renderer: Renderer | ReferenceRenderer) -> Iterator[Result]:
-        """Render the frames, one after the other, by a renderer of this texture's scene.
-
-        Raises
-        ------
-        InputError
-            If it is a tile, and the method makes no map in plan view.
-        """
+        """Render the frames, one after the other, by a renderer of this texture's scene."""
         for index in range(self.frames):
-            frame = renderer.render(self.time(index))
-            if self.tile and frame.caustic_map is None:
-                raise InputError(
-                    f"method: {renderer.plan.method} makes what a camera sees, and a tile is a map in plan view"
-                )
+            renderer.render(self.time(index))
             yield renderer.result()
 
     @property
@@ -178,12 +179,17 @@ def make_texture(
         scene = load_scene(scene)
     changes: tuple[Change, ...] = ()
     frames = 1 if loop is None else whole_frames(loop, fps)
+    for end in (start, start + (loop or 0.0)):
+        check_time(end)
+    method = known_method(scene.method.name if method is None else method)
+    if tile and method in SCREEN_SPACE:
+        raise InputError(f'method: "{method}" makes what a camera sees, and a tile is a map in plan view')
     if tile:
         scene, changes = tiled(scene, method, rounding)
     if loop is not None:
-        scene, moved = looping(scene, loop)
+        scene, moved = looping(scene, loop, method)
         changes += moved
-    return Texture(scene, tile, loop, frames, start, changes)
+    return Texture(scene, tile, loop, frames, start, changes, method)
 
 
 def whole_frames(seconds: float, fps: float) -> int:

@@ -132,7 +132,7 @@ def _check_together(*, tile: bool, loop: float | None, fps: float | None, roundi
 def _flip_book(made: Texture) -> FlipBook:
     from warp_caustics.flip_book import FlipBook
 
-    return FlipBook(made.frames, made.scene.map.resolution, made.scene.channels)
+    return FlipBook(made.frames, made.resolution, made.scene.channels)
 
 
 def _said(made: Texture, book: FlipBook | None, white: float | None) -> list[tuple[str, str]]:

@@ -117,7 +117,7 @@ class Row(Part):
     screen_errors: Errors | None = Field(
         default=None,
         description="in eye pixels: of what a screen-space method makes, or of the map as the camera sees it; null "
-        "without a camera",
+        "where no screen-space method is measured, and where the camera sees none of the map",
     )
     speed: Speed | None = Field(default=None, description="null where refused")
     on_front: bool = Field(
@@ -174,7 +174,7 @@ class Comparison(Part):
     time: float = Field(description="on the water's clock [s]")
     resolution: tuple[int, int] = Field(description="columns, rows of the map")
     reference: ReferenceRecord
-    screen: ScreenRecord | None = Field(default=None, description="null without a camera")
+    screen: ScreenRecord | None = Field(default=None, description="null where no screen-space method is measured")
     rows: list[Row]
     slopes: list[Slope]
     published: list[Published]

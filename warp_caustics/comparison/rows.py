@@ -27,6 +27,7 @@ QUARTILES = (25.0, 50.0, 75.0)
 """The median of a few times, and a spread that one disturbed frame does not make."""
 
 BROKEN = "the map has values that are not finite"
+UNSEEN = "no pixel of the camera sees the map alone, so there is nothing to judge"
 
 
 @dataclass(frozen=True)
@@ -54,14 +55,18 @@ def measured_row(trial: Trial, truth: Truth, device: str, threads: int | None, t
     if trial.refusal is not None:
         return Row(**common, settings=asked, status="refused", reason=trial.refusal)
     measured = measure(trial.scene, device, threads, time)
+    errors = _map_errors(measured.result, truth.reference)
+    screen_errors = _screen_errors(measured.result, truth.carried)
+    if errors is None and screen_errors is None:
+        return Row(**common, settings=asked, status="refused", reason=UNSEEN)
     finite = bool(np.isfinite(measured.result.image).all())
     return Row(
         **common,
         settings={**asked, **measured.plan.settings},
         status="measured" if finite else "broken",
         reason=None if finite else BROKEN,
-        errors=_map_errors(measured.result, truth.reference),
-        screen_errors=_screen_errors(measured.result, truth.carried),
+        errors=errors,
+        screen_errors=screen_errors,
         speed=_speed(measured),
     )
 

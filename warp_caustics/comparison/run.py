@@ -65,13 +65,17 @@ def compare(
     InputError
         If a method is not known, if no setting can serve the scene, or as :func:`~warp_caustics.make_plan`.
     """
+    from warp_caustics.assets import load_assets
     from warp_caustics.device import resolve_device, resolve_threads
+    from warp_caustics.facts import with_placed_water
     from warp_caustics.reference import make_reference
 
     tell = tell or (lambda number, count, what: None)
     names = chosen_methods(methods)
     if not isinstance(scene, Scene):
         scene = load_scene(scene)
+    # One water for all settings and resolutions, so that they can be compared.
+    scene = with_placed_water(scene, load_assets(scene))
     device = resolve_device(device)
     lanes = resolve_threads(threads, device)
     trials = plan_trials(scene, names, device, threads)

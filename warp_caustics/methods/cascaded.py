@@ -12,12 +12,12 @@ from ..cascade_passes import Layout, cascade_passes, composite_passes, eye_passe
 from ..cascades import CELL_TEXELS, Cascade, Cascades, backlund_miss, iors
 from ..energy import Energy
 from ..errors import InputError
-from ..eye import view_array
+from ..eye import camera_of, view_array
 from ..kernels.cascade_photon import CascadeSpec, Ramps
 from ..kernels.deposit import unit
 from ..kernels.ledger import BINS, ENTRIES
 from ..program import Buffer
-from ..sequence import Sequence
+from ..sequence import Sequence, Upload
 from ..specify import HEIGHT_FIELDS, Reason
 from ..state import ENDLESS
 from ..sun import refract_slopes
@@ -75,8 +75,7 @@ def cascaded(facts: Facts) -> Sequence:
 def _layout(facts: Facts) -> Layout:
     """Resolve the settings, and refuse what cannot be."""
     scene, settings = facts.scene, facts.scene.method.cascaded
-    if scene.camera is None:
-        raise InputError("method cascaded needs a camera: give the scene a [camera], or use a method in plan view")
+    camera = camera_of(scene, "cascaded")
     if facts.spec.faces_away and not facts.spec.self_shadow:
         raise InputError(
             'water.self_shadow: expected "auto" or true with method cascaded, since a light view sees no water that '
@@ -107,7 +106,7 @@ def _layout(facts: Facts) -> Layout:
     cascades = Cascades(
         facts, settings.count, settings.resolution, settings.near, settings.far, settings.blend, backlund
     )
-    return Layout(facts, settings, cascades, scene.camera, spec)
+    return Layout(facts, settings, cascades, camera, spec)
 
 
 def _values(layout: Layout) -> dict[str, Any]:
@@ -167,7 +166,8 @@ def _uploads(layout: Layout) -> dict[str, Callable[[str], Any]]:
         way = np.array([ray[:2] / -ray[2] for ray in rays])
         return wp.array((way - way[GREEN]).astype(np.float32), dtype=wp.vec2, device=device)
 
-    return {"ramps": ramps, **({"ways": ways} if layout.post else {})}
+    post = {"ways": Upload(Buffer("ways", "vec2", (3,), 8), ways)} if layout.post else {}
+    return {"ramps": ramps, **post}
 
 
 def _ledger(layout: Layout) -> tuple[Buffer, ...]:

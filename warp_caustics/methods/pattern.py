@@ -16,7 +16,7 @@ import numpy as np
 
 from ..assets.textures import load_texture
 from ..errors import InputError
-from ..eye import camera_of, eye_view, mesh_buffers, mesh_uploads, rasterize_steps, view_array
+from ..eye import camera_of, eye_view, mesh_uploads, rasterize_steps, view_array
 from ..kernels.pattern import PatternSpec, make_pattern
 from ..kernels.rest_light import make_shadow
 from ..pattern_texture import texture_shape, upload_texture
@@ -24,7 +24,7 @@ from ..pattern_volume import device_medium, device_pattern, scale_of, volume_of
 from ..program import Buffer
 from ..scene.faults import gathered
 from ..screen import receiver_meshes
-from ..sequence import Sequence, Step
+from ..sequence import Sequence, Step, Upload
 from ..specify import HEIGHT_FIELDS, Reason
 from ..sun import refract_slopes
 from ..triangles import mesh_triangles
@@ -70,12 +70,13 @@ def pattern(facts: Facts) -> Sequence:
         values={"sun": tuple(scene.sun.direction)},
         uploads={
             **eye.uploads,
-            **mesh_uploads("ground", lambda device: mesh_triangles(*meshes, origin=origin, device=device)),
-            "texture": lambda device: upload_texture(texture, device),
+            **mesh_uploads("ground", counts, lambda device: mesh_triangles(*meshes, origin=origin, device=device)),
+            "texture": Upload(
+                Buffer("texture", "float32", texture_shape(texture), 4), lambda device: upload_texture(texture, device)
+            ),
             "pattern": lambda _: device_pattern(scene, volume),
             "medium": lambda _: device_medium(facts),
         },
-        uploaded=(*mesh_buffers("ground", counts), Buffer("texture", "float32", texture_shape(texture), 4)),
         views=lambda camera: {"eye.view": view_array(eye_view(camera).projection(origin))},
         settings={
             "texture": settings.texture or "own tile",
@@ -85,6 +86,7 @@ def pattern(facts: Facts) -> Sequence:
         reasons=_reasons(facts, shadows, shades),
         warnings=_warnings(scene),
         samples=rows * columns,
+        meets_scene=shadows,
         follows_water=False,
     )
 
@@ -120,6 +122,8 @@ def _check(scene: Scene) -> None:
             "method.pattern.split: it makes colours, and the light of this scene has none; expected 0, or a "
             "sun.irradiance of [r, g, b]"
         )
+    if scene.water.self_shadow is True:
+        faults.append('water.self_shadow: method "pattern" does not look at the waves; expected "auto" or false')
     if scene.method.accumulate != "float32":
         faults.append(
             f'method.accumulate = "{scene.method.accumulate}": method "pattern" adds nothing up; leave it out'

@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..kernels.box_blur import make_box_blur
 from ..kernels.sample import Sampling, face_normals, make_heights, make_sample, scale_to_irradiance
 from ..program import Buffer
-from ..sequence import Lane, Sequence, Step
+from ..sequence import Lane, Sequence, Step, Upload
 from ..specify import Reason
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ BANDS = 8
 ROUNDING = 1e-9
 """Share of the map's size by which water may fall short of it: sums of its corners are rounded."""
 
-OF_THE_WATER = ("surface by height map", "simulation")
+OF_THE_WATER = ("surface by height map", "simulation", "spectrum")
 """The scene's own reasons that hold for a method that asks the water for its height alone."""
 
 
@@ -68,7 +68,6 @@ def sample(facts: Facts) -> Sequence:
         caustic_map="caustic_map",
         values={**_values(facts), **{f"band{i}": first for i, first in enumerate(first_rows)}},
         uploads=_uploads(environment),
-        uploaded=() if environment is None else (Buffer("environment", "float32", environment.shape, 4),),
         settings={
             **settings.model_dump(exclude_none=True, exclude={"environment_power"} if settings.environment else None),
             "ground_offset": _ground_offset(facts),
@@ -160,7 +159,7 @@ def _uploads(environment: NDArray[np.float32] | None) -> Mapping[str, Callable[[
 
         return wp.array(environment, dtype=float, device=device)
 
-    return {"environment": upload}
+    return {"environment": Upload(Buffer("environment", "float32", environment.shape, 4), upload)}
 
 
 def _unfit(facts: Facts) -> Iterator[str]:

@@ -14,7 +14,7 @@ from ..device import free_memory, resolve_device, resolve_threads
 from ..dispersion import CHANNELS, channel_scene, own_channel, stacked_energy
 from ..energy import Energy
 from ..errors import InputError
-from ..facts import gather_facts
+from ..facts import gather_facts, with_placed_water
 from ..ledger import beyond_border
 from ..magnitude import check_asset_magnitudes, check_magnitudes
 from ..scene import Scene, load_scene
@@ -103,7 +103,7 @@ def make_reference(
     """
     facts, device, threads = _prepared(scene, time, device, threads)
     if facts.scene.medium.dispersion != "none":
-        return _dispersed(facts.scene, time, tolerance, device, threads, cache)
+        return _dispersed(with_placed_water(facts.scene, facts.assets), time, tolerance, device, threads, cache)
     settings = facts.scene.method.reference
     budget = Budget(settings.tolerance if tolerance is None else tolerance, settings.rays)
     if not (budget.tolerance > 0.0 and np.isfinite(budget.tolerance)):
@@ -170,9 +170,10 @@ def jittered_photons(
     """
     facts, device, threads = _prepared(scene, time, device, threads)
     if facts.scene.medium.dispersion != "none":
+        placed = with_placed_water(facts.scene, facts.assets)
         channels = [
             jittered_photons(
-                channel_scene(facts.scene, c), time, per_side=per_side, seed=seed, device=device, threads=threads
+                channel_scene(placed, c), time, per_side=per_side, seed=seed, device=device, threads=threads
             )
             for c in range(len(CHANNELS))
         ]

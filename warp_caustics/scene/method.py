@@ -32,6 +32,9 @@ METHODS: Final = (
 )  # fmt: skip
 
 
+#: Methods that make what a camera sees, and no map.
+SCREEN_SPACE: Final = ("cascaded", "pattern")
+
 METHOD_NAME: Final = one_of(*METHODS)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -74,3 +75,11 @@ class PatternSettings(Model):
         description="what the masks leave out is lit as under calm water (`light`), or black (`overlay`, as published: "
         "to be added to a picture)",
     )
+
+    @classmethod
+    def rules(cls, given: Mapping[str, Any]) -> Iterator[str]:
+        """Yield the fault of a strength that no mask takes."""
+        yield from super().rules(given)
+        mask = given.get("luminance_mask", "shadow")
+        if "luminance_strength" in given and mask in ("none", "shadow"):
+            yield f'expected no luminance_strength with luminance_mask "{mask}"; it is of "lerp" and "smoothstep"'
