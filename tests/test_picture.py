@@ -281,6 +281,20 @@ def test_what_goes_on_around_the_map(water: dict, receiver: dict, goes_on: bool)
         np.testing.assert_allclose(np.subtract(facts.scene.map.origin, what.map.origin), -np.asarray(what.map.size))
 
 
+def test_what_lights_the_ground_around_a_camera_s_own_map(device: str) -> None:
+    """Cascades follow light, so that beams go on with it; a projected pattern ends where its volume does."""
+    from warp_caustics.surroundings import make_surroundings
+
+    seen = scene(
+        camera=eye((1.0, -1.0, 2.0), (1.0, 0.5, 0.0)),
+        method={"cascaded": {"resolution": 32, "count": 1}},
+        size=(2.0, 2.0),
+    )
+    around = make_surroundings(wc.render(seen, "cascaded", device))
+    assert around is not None and around.renderer.plan.method == "beam"
+    assert make_surroundings(wc.render(seen, "pattern", device)) is None
+
+
 def test_files_of_a_picture(tmp_path) -> None:
     from PIL import Image
 

@@ -84,7 +84,7 @@ class Painter:
         self._device, self._threads = result.device, result.plan.threads
         self._straight = result.caustic_map is None
         self._published = result.method in PUBLISHED
-        self._around = None if self._straight or self._published else make_surroundings(result)
+        self._around = None if self._published else make_surroundings(result)
         self._state = SceneState(self.facts, self._device)
         self._view = wp.clone(view_array(eye_view(scene.camera).projection(_origin(scene))), device=self._device)
         self._look = self._appearance(scene, scene.camera)

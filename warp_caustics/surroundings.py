@@ -17,6 +17,12 @@ if TYPE_CHECKING:
     from .result import Result
     from .scene import Scene
 
+LIT_BY_BEAMS = frozenset({"reference", "cascaded"})
+"""Methods that follow light and have no map for what lies around: one converges slowly, one makes none."""
+
+NO_LIGHT = frozenset({"pattern"})
+"""Methods whose picture of light ends where they say it does."""
+
 WIDER = 3.0
 """Sides of the wider map over those of the map."""
 
@@ -58,20 +64,20 @@ def make_surroundings(result: Result) -> Surroundings | None:
 
     Waves have no end, and a plane or a terrain none either; a height map, a simulation and a mesh have, and rings
     belong to the map that they surround. A sea goes on where the floor is flat: over a terrain its mean depth, and
-    with it its waves, would be others. What a reference converges slowly is lit by beams here.
+    with it its waves, would be others.
     """
     from .renderer import Renderer
 
     scene = result.scene
     kind, water = receiver_kind(scene), scene.water
     waves = water.waves is not None or (water.preset is not None and not is_radial(scene))
-    if kind == "mesh" or not (waves or (water.spectrum is not None and kind == "plane")):
+    if result.method in NO_LIGHT or kind == "mesh" or not (waves or (water.spectrum is not None and kind == "plane")):
         return None
     origin, size = _wider(result)
     pixels = np.ceil(np.asarray(scene.map.resolution) * size / scene.map.size / COARSER).astype(int)
     window = Map(origin=origin, size=size, resolution=(int(pixels[0]), int(pixels[1])))
     wide = _with_frequencies(result).model_copy(update={"map": window})
-    method = "beam" if result.method == "reference" else result.method
+    method = "beam" if result.method in LIT_BY_BEAMS else result.method
     try:
         renderer = Renderer(wide, method, result.device, result.plan.threads)
     except InputError:
