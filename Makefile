@@ -28,8 +28,9 @@ bench: $(VENV)/.installed-test
 	  $(BIN)/python bench/compare_scenes.py; \
 	  $(BIN)/python -m pytest bench --benchmark-only --benchmark-json="$$folder/frames.json"; \
 	  $(BIN)/python bench/leaving_out.py -o "$$folder/leaving_out"; \
-	  $(BIN)/python bench/gather_terrain.py -o "$$folder/gather_terrain"; \
-	  $(BIN)/python bench/comparators.py -o "$$folder/comparators"; \
+	  $(BIN)/python bench/gather_terrain.py -o docs/tables; \
+	  $(BIN)/python bench/comparators.py -o docs/tables; \
+	  $(BIN)/python bench/cascades.py -o docs/tables; \
 	  $(BIN)/python bench/stability/run.py -o "$$folder/stability"; \
 	  $(BIN)/python bench/stability/stiff.py -o "$$folder/stability"; \
 	  $(BIN)/python bench/ratio.py -o "$$folder/ratio"

@@ -46,6 +46,15 @@ COMPARATORS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """By name, the method and its settings; those of the area ratio differ from its defaults by what the name says."""
 
+ABOUT = """# The comparators
+
+Light that a map holds over the light of the reference's map, and relative L2 error against the reference, at one sample
+a pixel: medians of {frames} frames of {resolution} x {resolution} pixels of a plane under waves like the pool's, scaled
+to an rms slope. `area_ratio` is the published form: `|dFdx| |dFdy|`, added. Its mean has no bound where sheets fold, so
+that no one factor tells how much light it invents: another frame or resolution gives another. Made by `python
+bench/comparators.py`.
+
+"""
 HEADING = "| rms slope | depth | " + " | ".join(COMPARATORS) + " |\n|" + "---|" * (2 + len(COMPARATORS))
 
 
@@ -88,7 +97,8 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=5, help="frames of each water")
     chosen = parser.parse_args()
     wp.config.log_level = wp.LOG_WARNING
-    print(HEADING)
+    begin = ABOUT.format(resolution=chosen.resolution, frames=chosen.frames) + HEADING
+    print(begin)
     measured = []
     for row in rows(chosen.resolution, chosen.frames):
         measured.append(row)
@@ -96,7 +106,7 @@ def main() -> None:
     chosen.output.mkdir(parents=True, exist_ok=True)
     about = {"resolution": chosen.resolution, "frames": chosen.frames, "warp": wp.config.version, "rows": measured}
     (chosen.output / "comparators.json").write_text(json.dumps(about, indent=1) + "\n")
-    (chosen.output / "comparators.md").write_text("\n".join([HEADING, *map(line, measured)]) + "\n")
+    (chosen.output / "comparators.md").write_text("\n".join([begin, *map(line, measured)]) + "\n")
 
 
 if __name__ == "__main__":
