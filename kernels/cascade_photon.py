@@ -76,7 +76,6 @@ class CascadeSpec:
 class Ramps:
     """The thesis's constant brightness, and the depths at which it begins and ends."""
 
-    constant: float
     least: float  # [m]
     most: float  # [m]
 
@@ -86,7 +85,7 @@ def ramp_hard(ramps: Ramps, depth: float) -> float:
     """Brightness of a photon under so much water [m], as published first: ramps of a metre at either end."""
     deep = wp.min(1.0, wp.max(0.0, ramps.most - depth))
     shallow = wp.min(1.0, wp.max(0.0, depth - ramps.least))
-    return ramps.constant * deep * shallow
+    return deep * shallow
 
 
 @wp.func
@@ -94,7 +93,7 @@ def ramp_smooth(ramps: Ramps, depth: float) -> float:
     """As :func:`ramp_hard`, with a brightness that falls all the way down: the thesis's stand-in for absorption."""
     deep = wp.min(1.0, wp.max(0.0, (ramps.most - depth) / ramps.most))
     shallow = wp.min(1.0, wp.max(0.0, depth - ramps.least))
-    return ramps.constant * deep * shallow
+    return deep * shallow
 
 
 RAMPS = {"hard": ramp_hard, "smooth": ramp_smooth}

@@ -1,7 +1,9 @@
 """From the cascades' pictures to one: per pixel the finest cascade that reaches it, as irradiance on what it sees.
 
 Bäcklund's thesis, 3.5, switches from one cascade to the next at its far plane. With a zone of blending the weights of
-all cascades add up to 1 at every depth, so that the light stays as it is across a border.
+all cascades add up to 1 at every depth, so that the light stays as it is across a border. Each cascade takes its part
+of what the finer ones have left, and the last takes the rest: so a pixel whose light a view does not hold, since the
+eye has turned or gone since views were fitted, falls to the next one.
 """
 
 import functools
@@ -15,7 +17,7 @@ from .photon import Scene, SunSample, share_lit
 from .project import FAR, make_clearance
 from .spec import Spec
 from .surface import HEIGHT_AND_SLOPE
-from .views import View, unproject
+from .views import View, project, unproject
 
 
 @wp.func
@@ -29,9 +31,18 @@ def reaches(depth: float, far: float, zone: float) -> float:
 
 
 @wp.func
-def cascade_weight(depth: float, before: wp.vec2, own: wp.vec2) -> float:
-    """Weight of a cascade at a depth; ``before`` and ``own`` are (far, zone) of the finer one and of itself."""
-    return reaches(depth, own[0], own[1]) - reaches(depth, before[0], before[1])
+def holds(view: View, point: wp.vec3, need: wp.vec4, side: float, zone: float) -> float:
+    """How far a light view holds all water that can light a point: 1 by a zone of texels or more, 0 if it does not.
+
+    ``need`` is how far that water may stand to either side [texels], lowest and highest; ``side`` is the view's.
+    """
+    at = project(view, point)
+    room = wp.min(wp.min(at[0] + need[0], at[1] + need[1]), wp.min(side - at[0] - need[2], side - at[1] - need[3]))
+    if room < 0.0:
+        return 0.0
+    if room >= zone:
+        return 1.0
+    return room / zone
 
 
 @functools.cache
@@ -43,22 +54,39 @@ def make_composite(accumulate: str, channels: int, colours: int, flux: bool) -> 
     def composite(
         # In:
         light: wp.array[dtype],
+        eye_view: wp.array[View],
         eye_depth: wp.array2d[float],
         eye_area: wp.array2d[float],
-        before: wp.vec2,
-        own: wp.vec2,
+        light_view: wp.array[View],
+        reach: wp.vec2,
+        need: wp.vec4,
+        side: float,
+        zone: float,
         scale: wp.vec3d,
         # Out:
+        left_out: wp.array2d[float],
         picture_out: wp.array[float],
     ):
-        """One thread a pixel; launch dims (rows, columns). ``scale`` is the flux of an accumulator's unit by colour."""
+        """One thread a pixel; launch dims (rows, columns).
+
+        ``reach`` is where the cascade ends and the depth before that over which it gives way [m], ``zone`` the same of
+        its view's sides [texels]; a view without a side (0) takes all that is left. ``left_out`` is what the finer
+        cascades have left of each pixel, and what this one leaves. ``scale`` is the flux of an accumulator's unit by
+        colour.
+        """
         row, column = wp.tid()
         depth = eye_depth[row, column]
         if not wp.isfinite(depth):
             return
-        weight = cascade_weight(depth, before, own)
+        weight = left_out[row, column]
+        if side > 0.0:
+            weight *= reaches(depth, reach[0], reach[1])
+            if weight > 0.0:
+                point = unproject(eye_view[0], float(column) + 0.5, float(row) + 0.5, depth)
+                weight *= holds(light_view[0], point, need, side, zone)
         if weight <= 0.0:
             return
+        left_out[row, column] = left_out[row, column] - weight
         if wp.static(flux):
             weight /= eye_area[row, column]
         pixel = row * eye_depth.shape[1] + column

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 import warp as wp
@@ -11,14 +9,14 @@ from kernel_helpers import points
 
 from warp_caustics.eye import view_array
 from warp_caustics.kernels.cascade_photon import RAMPS, Ramps, slope_of
-from warp_caustics.kernels.composite import cascade_weight, make_composite
+from warp_caustics.kernels.composite import make_composite
 from warp_caustics.kernels.deposit import FLUX
 from warp_caustics.kernels.disperse import disperse
 from warp_caustics.kernels.eye_splat import MOST_RADIUS, make_splat_eye, on_screen, outline, screen_step
 from warp_caustics.kernels.eye_surface import eye_surface
 from warp_caustics.kernels.filter import make_filter
 from warp_caustics.kernels.views import View
-from warp_caustics.views import EyeView
+from warp_caustics.views import EyeView, LightView
 
 ROWS, COLUMNS = 36, 64
 EYE = EyeView((0.3, -2.0, 1.5), (0.2, 0.5, -0.6), 50.0, (COLUMNS, ROWS))
@@ -191,39 +189,66 @@ def test_even_photons_light_a_floor_evenly_however_fine_the_pixels(device):
     assert even.std() < RIPPLE
 
 
-@wp.kernel(enable_backward=False)
-def weights(depths: wp.array[float], before: wp.vec2, own: wp.vec2, weight_out: wp.array[float]):
-    i = wp.tid()
-    weight_out[i] = cascade_weight(depths[i], before, own)
+def composed(device, depth, parts, flux=True, light=1.0):
+    """Compose cascades one after the other; each is (reach, need, side, zone, scale). Looks straight down."""
+    rows, columns = depth.shape
+    eye = EyeView((0.0, 0.0, 5.0), (0.0, 0.0, 0.0), 60.0, (columns, rows)).projection()
+    sun = LightView((0.0, 0.0, -1.0), (-1.0, -1.0, -1.0), (1.0, 1.0, 0.0), (10, 10)).projection()
+    left = wp.full((rows, columns), 1.0, dtype=float, device=device)
+    area = wp.full((rows, columns), 0.5, dtype=float, device=device)
+    picture = wp.zeros(rows * columns * 3, dtype=float, device=device)
+    given = wp.array(depth.astype(np.float32), dtype=float, device=device)
+    lights = wp.full(rows * columns, light, dtype=float, device=device)
+    found = []
+    for reach, need, side, zone, scale in parts:
+        before = picture.numpy().reshape(rows, columns, 3).copy()
+        views = [wp.clone(view_array(view), device=device) for view in (eye, sun)]
+        wp.launch(
+            make_composite("float32", 1, 3, flux), dim=(rows, columns),
+            inputs=[lights, views[0], given, area, views[1], wp.vec2(*reach), wp.vec4(*need), side, zone,
+                    wp.vec3d(*scale)],
+            outputs=[left, picture], device=device,
+        )  # fmt: skip
+        found.append(picture.numpy().reshape(rows, columns, 3) - before)
+    return np.array(found)
+
+
+UNSCALED = (1.0, 1.0, 1.0)
+NOWHERE = (0.0, 0.0, 0.0, 0.0)
+EVERYWHERE = (1e3, 1e3, -1e3, -1e3)  # texels that a view has to spare
 
 
 @pytest.mark.parametrize("zone", [0.0, 0.3, 1.0])
 def test_the_weights_of_the_cascades_add_up_to_one(device, zone):
-    depths = np.linspace(0.01, 5.0, 400).astype(np.float32)
-    ends = [(-1.0, 0.0), (2.0, zone), (3.0, zone), (4.0, 0.0)]
-    found = []
-    for before, own in pairwise(ends):
-        out = wp.empty(len(depths), dtype=float, device=device)
-        given = wp.array(depths, dtype=float, device=device)
-        wp.launch(weights, dim=len(depths), inputs=[given, wp.vec2(*before), wp.vec2(*own)], outputs=[out],
-                  device=device)  # fmt: skip
-        found.append(out.numpy())
-    assert (np.array(found) >= 0.0).all()
-    np.testing.assert_allclose(np.sum(found, axis=0), np.where(depths <= 4.0, 1.0, 0.0), atol=1e-6)
-    jump = max(np.abs(np.diff(one[depths < 3.9])).max() for one in found)
-    assert jump == 1.0 if zone == 0.0 else jump <= np.diff(depths).max() / zone * 1.01
+    depth = np.linspace(0.01, 5.0, 400)[None, :]
+    parts = [((end, zone), EVERYWHERE, 10.0, 0.0, UNSCALED) for end in (2.0, 3.0)]
+    found = composed(device, depth, [*parts, ((4.0, 0.0), NOWHERE, 0.0, 0.0, UNSCALED)], flux=False)[..., 0]
+    assert (found >= 0.0).all()
+    np.testing.assert_allclose(found.sum(axis=0), 1.0, atol=1e-6)  # the last takes what lies behind it, too
+    jump = max(np.abs(np.diff(one)).max() for one in found)
+    assert jump == 1.0 if zone == 0.0 else jump <= np.diff(depth).max() / zone * 1.01
+
+
+@pytest.mark.parametrize("zone", [0.0, 3.0])
+def test_what_a_view_does_not_hold_falls_to_the_next(device, zone):
+    """The eye looks down on 5.8 m of ground, of which the view of ten texels holds 2 m."""
+    depth = np.full((40, 40), 5.0)
+    need = (-1.0, -1.0, 1.0, 1.0)  # a texel to each side
+    whole = ((9.0, 0.0), NOWHERE, 0.0, 0.0, UNSCALED)
+    inner, rest = composed(device, depth, [((9.0, 0.0), need, 10.0, zone, UNSCALED), whole], flux=False)[..., 0]
+    np.testing.assert_allclose(inner + rest, 1.0, atol=1e-6)
+    x = (np.arange(40) + 0.5 - 20.0) / 20.0 * 5.0 * np.tan(np.radians(30.0))
+    room = 5.0 * (1.0 - np.maximum(np.abs(x)[None, :], np.abs(x)[:, None])) - 1.0  # texels of 0.2 m
+    expected = np.clip(room / zone, 0.0, 1.0) if zone else room >= 0.0
+    np.testing.assert_allclose(inner, expected, atol=1e-4)
+    assert 0.0 < inner.mean() < 0.2
 
 
 def test_the_composite_is_flux_over_area_by_weight(device):
-    depth = np.array([[1.0, 1.9, 2.5, np.inf]], dtype=np.float32)
-    light = wp.array(np.array([2.0, 2.0, 2.0, 2.0], dtype=np.float32), dtype=float, device=device)
-    area = wp.array(np.array([[0.5, 0.5, 0.5, 0.0]], dtype=np.float32), dtype=float, device=device)
+    depth = np.array([[1.0, 1.9, 2.5, np.inf]])
+    part = ((2.0, 0.2), EVERYWHERE, 10.0, 0.0, (3.0, 6.0, 9.0))
     for flux, expected in ((True, [12.0, 6.0, 0.0, 0.0]), (False, [6.0, 3.0, 0.0, 0.0])):
-        picture = wp.zeros(12, dtype=float, device=device)
-        inputs = [light, wp.array(depth, dtype=float, device=device), area, wp.vec2(-1.0, 0.0), wp.vec2(2.0, 0.2)]
-        wp.launch(make_composite("float32", 1, 3, flux), dim=(1, 4), inputs=[*inputs, wp.vec3d(3.0, 6.0, 9.0)],
-                  outputs=[picture], device=device)  # fmt: skip
-        found = picture.numpy().reshape(4, 3)
+        found = composed(device, depth, [part], flux, light=2.0)[0, 0]
         np.testing.assert_allclose(found, np.outer(expected, [1.0, 2.0, 3.0]), rtol=1e-5)
 
 
@@ -241,7 +266,7 @@ def smooth_ramp(ramps: Ramps, depths: wp.array[float], out: wp.array[float]):
 
 def test_the_ramps_are_those_of_the_thesis(device):
     ramps = Ramps()
-    ramps.constant, ramps.least, ramps.most = 0.5, 0.2, 6.0
+    ramps.least, ramps.most = 0.2, 6.0
     depths = np.array([0.0, 0.2, 0.7, 1.2, 3.0, 5.0, 5.5, 6.0, 7.0], dtype=np.float32)
     found = {}
     for name, kernel in (("hard", hard_ramp), ("smooth", smooth_ramp)):
@@ -250,8 +275,8 @@ def test_the_ramps_are_those_of_the_thesis(device):
                   device=device)  # fmt: skip
         found[name] = out.numpy()
     shallow = np.clip(depths - 0.2, 0.0, 1.0)
-    np.testing.assert_allclose(found["hard"], 0.5 * shallow * np.clip(6.0 - depths, 0.0, 1.0), atol=1e-6)
-    np.testing.assert_allclose(found["smooth"], 0.5 * shallow * np.clip((6.0 - depths) / 6.0, 0.0, 1.0), atol=1e-6)
+    np.testing.assert_allclose(found["hard"], shallow * np.clip(6.0 - depths, 0.0, 1.0), atol=1e-6)
+    np.testing.assert_allclose(found["smooth"], shallow * np.clip((6.0 - depths) / 6.0, 0.0, 1.0), atol=1e-6)
 
 
 @wp.kernel(enable_backward=False)

@@ -45,23 +45,49 @@ CAMERAS = st.builds(
 )
 
 
+def assert_holds(cascades, cascade, view, region, facts, seed):
+    """All water whose light can land in a region stands in the view, by the bounds of refraction."""
+    random, slopes = np.random.default_rng(seed), extreme_slopes(facts.scene, facts.assets)
+    landed = random.dirichlet(np.full(len(region), 0.3), size=200) @ region
+    landed = np.concatenate([region, landed])
+    rays = refract_slopes(facts.suns[0], slopes[random.integers(0, len(slopes), len(landed))], facts.ior)
+    depth = random.choice([-1.0, 0.0, 1.0], len(landed)) * facts.amplitude - landed[:, 2]
+    water = landed + (depth / rays[:, 2])[:, None] * rays
+    at, _ = view.project(water + view.origin)
+    assert (at >= 0.0).all() and (at <= RESOLUTION).all()
+
+
 @settings(max_examples=40)
 @given(camera=CAMERAS, angle=st.sampled_from(sorted(FACTS)), seed=st.integers(0, 2**31))
-def test_each_light_view_holds_all_water_that_can_light_its_sub_frustum(camera, angle, seed):
-    facts, random = FACTS[angle], np.random.default_rng(seed)
+def test_each_light_view_holds_what_its_own_camera_sees_and_the_last_one_all(camera, angle, seed):
+    facts = FACTS[angle]
+    cascades = Cascades(facts, 3, RESOLUTION)
+    own = facts.scene.camera
+    for cascade, view in zip(cascades.cascades, cascades.projections(own), strict=True):
+        assert_holds(cascades, cascade, view, cascades.lit_region(own, cascade.far), facts, seed)
+    last, moved = cascades.cascades[-1], cascades.projections(camera)[-1]
+    region = cascades.lit_region(camera, 100.0)  # whatever the eye sees, from anywhere
+    if len(region):
+        assert_holds(cascades, last, moved, region, facts, seed)
+
+
+@settings(max_examples=40)
+@given(camera=CAMERAS, angle=st.sampled_from(sorted(FACTS)), seed=st.integers(0, 2**31))
+def test_a_far_plane_that_is_given_bounds_the_last_view(camera, angle, seed):
+    facts = FACTS[angle]
     cascades = Cascades(facts, 3, RESOLUTION, near=0.5, far=9.0)
-    slopes = extreme_slopes(facts.scene, facts.assets)
-    for cascade, view in zip(cascades.cascades, cascades.projections(camera), strict=True):
-        region = cascades.lit_region(camera, cascade.far)
-        if not len(region):
-            continue
-        landed = random.dirichlet(np.full(len(region), 0.3), size=200) @ region
-        landed = np.concatenate([region, landed])
-        rays = refract_slopes(facts.suns[0], slopes[random.integers(0, len(slopes), len(landed))], facts.ior)
-        depth = random.choice([-1.0, 0.0, 1.0], len(landed)) * facts.amplitude - landed[:, 2]
-        water = landed + (depth / rays[:, 2])[:, None] * rays
-        at, _ = view.project(water + view.origin)
-        assert (at >= 0.0).all() and (at <= RESOLUTION).all()
+    region = cascades.lit_region(camera, 9.0)
+    if len(region):
+        assert_holds(cascades, cascades.cascades[-1], cascades.projections(camera)[-1], region, facts, seed)
+
+
+def test_near_water_gets_more_photons():
+    """On every bundled scene with a camera the nearest cascade is finer than the last, or there is one alone."""
+    for name in ("pool", "beach", "lake", "tank"):
+        facts = make_plan(name, "beam", "cpu", 1).facts
+        areas = [cascade.texel_area for cascade in Cascades(facts, 4, RESOLUTION).cascades]
+        assert areas == sorted(areas)
+        assert areas[0] < 0.7 * areas[-1], name
 
 
 @given(camera=CAMERAS, step=st.tuples(*[st.floats(-0.3, 0.3)] * 3))

@@ -219,13 +219,14 @@ def composite_passes(layout: Layout) -> tuple[Lane, tuple[Buffer, ...]]:
     flux, guided, post = settings.brightness == "flux", settings.filter == "bilateral", layout.post
     chain = ["picture"] * (post or settings.filter != "none") + ["dispersed"] * (post and settings.filter != "none")
     names = [*chain, "screen_map"]
-    steps: list[Step | Fill] = [Fill("composite", "the finest cascade of each pixel, as irradiance", names[0])]
+    does = "the finest cascade that holds each pixel, as irradiance"
+    steps: list[Step | Fill] = [Fill("composite", does, names[0]), Fill("composite", does, "left", 1.0)]
     for number in range(settings.count):
         prefix = f"cascade{number}"
-        bind = {**EYE, "light": f"{prefix}.light", "before": f"{prefix}.before", "own": f"{prefix}.own",
-                "scale": f"{prefix}.scale", "picture": names[0]}  # fmt: skip
+        own = {name: f"{prefix}.{name}" for name in ("light", "reach", "need", "side", "zone", "scale")}
+        bind = {**EYE, **own, "light_view": f"{prefix}.view", "picture": names[0]}
         steps.append(
-            Step("composite", "the finest cascade of each pixel, as irradiance",
+            Step("composite", does,
                  lambda: make_composite(accumulate, channels, colours, flux), layout.picture, bind)
         )  # fmt: skip
     if facts.spec.shore:
@@ -241,7 +242,8 @@ def composite_passes(layout: Layout) -> tuple[Lane, tuple[Buffer, ...]]:
         bind = {**EYE, "picture": names[-2], "screen_map": "screen_map", "radius": "filter_radius"}
         steps.append(Step("filter", f"{settings.filter} of the picture", lambda: make_filter(guided, colours),
                           layout.picture, bind))  # fmt: skip
-    return tuple(steps), tuple(layout.picture_buffer(name) for name in names)
+    left = Buffer("left", "float32", layout.picture, 4)
+    return tuple(steps), (left, *(layout.picture_buffer(name) for name in names))
 
 
 def _lattice_triangles(rows: int, columns: int, device: str) -> Any:

@@ -1,9 +1,10 @@
 """Cascades: the eye's frustum cut at growing far planes, and the view along the sun that lights each part.
 
 Bäcklund's thesis, 3.2.2, after Microsoft's cascaded shadow maps, "fit to scene": sub-frusta share the near plane of
-the eye, and their far planes grow linearly. A light view encloses all water whose light can land in its sub-frustum.
-Its size depends on neither the eye's place nor its direction, and it moves by whole texels of a grid that is fixed in
-the world: a moving eye does not make it shimmer. All here is float64, from the map's origin and the water's level.
+the eye, and their far planes grow linearly. A light view encloses all water whose light can land in what the
+scene's own camera sees of its sub-frustum; the last one holds all of the scene. Its size stays when the eye moves, and
+it moves by whole texels of a grid that is fixed in the world: a moving eye does not make it shimmer. What an eye that
+has turned sees beside a view is lit by the next. All here is float64, from the map's origin and the water's level.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .dispersion import CHANNELS, channel_scene
+from .errors import InputError
 from .eye import eye_view
 from .receiver import receiver_kind
 from .sun import refract_slopes
@@ -40,6 +42,10 @@ INSIDE = 1e-9
 DETERMINANT = 1e-12
 """Below it three planes, of unit normals, meet in no point."""
 
+ROOM = 0.05
+"""Share by which a view is wider on each side than what the scene's camera sees of its cascade: an eye that turns a
+little keeps it whole; one that turns more is lit by the next cascade where this one has ended."""
+
 FARTHER = 1e-6
 """Share by which the last far plane lies behind the farthest that the eye sees: float32 depths round to 6e-8."""
 
@@ -62,6 +68,8 @@ class Cascade:
         Texels by which the water's lattice is wider on each side: lifted corners are seen elsewhere.
     ground_margin : (int, int)
         The same of the ground's.
+    whole : bool
+        Whether it holds all of the scene, and so stands still.
     """
 
     far: float
@@ -70,6 +78,7 @@ class Cascade:
     texel: Float64Array
     margin: tuple[int, int]
     ground_margin: tuple[int, int]
+    whole: bool
 
     @property
     def texel_area(self) -> float:
@@ -131,12 +140,23 @@ class Cascades:
         self._pad = self._padding(reaches, backlund, facts.amplitude - facts.ground.lowest)
         nearest, farthest = self._seen_depths(camera)
         self.near = nearest if near is None else near
+        if far is not None and far <= nearest:
+            raise InputError(
+                f"method.cascaded.far: expected more than {nearest:.4g} m, where what the camera sees begins"
+            )
+        if near is not None and near >= farthest:
+            raise InputError(
+                f"method.cascaded.near: expected less than {farthest:.4g} m, where what the camera sees ends"
+            )
         self.far = max(farthest * (1.0 + FARTHER) if far is None else far, self.near * (1.0 + FARTHER))
+        # Nothing lies behind the last cascade, unless a far plane was asked for.
+        self._endless = far is None
         fars = self.near + (self.far - self.near) * np.arange(1, count + 1) / count
         zone = blend * (self.far - self.near) / count
         swing = (facts.amplitude, 0.5 * (min(facts.ground.highest, facts.amplitude) - facts.ground.lowest))
         self.cascades = tuple(
-            self._cascade(camera, float(end), zone if i < count - 1 else 0.0, swing) for i, end in enumerate(fars)
+            self._cascade(camera, float(end), zone if i < count - 1 else 0.0, swing, last=i == count - 1)
+            for i, end in enumerate(fars)
         )
 
     def projections(self, camera: Camera) -> tuple[Projection, ...]:
@@ -152,18 +172,34 @@ class Cascades:
         planes = np.concatenate([frustum_planes(self.eye(camera), far), box_planes(self._low, self._high)])
         return polytope_corners(planes)
 
-    def _cascade(self, camera: Camera, far: float, zone: float, swing: tuple[float, float]) -> Cascade:
-        across = self._across(self._box_corners())
-        # No wider than the scene; no wider than a sphere around the sub-frustum, which holds it however it turns.
-        half = np.minimum(frustum_radius(self.eye(camera), far), 0.5 * (across.max(axis=0) - across.min(axis=0)))
+    def need(self, cascade: Cascade) -> Float64Array:
+        """How far the water that lights a point may stand from it across the light, lowest and highest [texels]."""
+        return np.concatenate([self._pad[0] / cascade.texel, self._pad[1] / cascade.texel])
+
+    def _cascade(self, camera: Camera, far: float, zone: float, swing: tuple[float, float], last: bool) -> Cascade:
+        half = half_extent(self._across(self._box_corners()))
+        region = self.lit_region(camera, far)
+        if last and not self._endless:
+            # No wider than a sphere around the frustum, which holds it however it turns.
+            half = np.minimum(frustum_radius(self.eye(camera), far), half)
+        elif not last and len(region):
+            half = np.minimum((1.0 + 2.0 * ROOM) * half_extent(self._across(region)), half)
         texel = (2.0 * half + self._pad[1] - self._pad[0]) / (self.resolution - SNAP_TEXELS)
         lift = np.abs(self._axes[:2, 2]) / texel
         margins = [tuple(int(m) for m in np.ceil(lift * s) + CELL_TEXELS) for s in swing]
-        return Cascade(far, zone, half, texel, (margins[0][0], margins[0][1]), (margins[1][0], margins[1][1]))
+        return Cascade(
+            far,
+            zone,
+            half,
+            texel,
+            (margins[0][0], margins[0][1]),
+            (margins[1][0], margins[1][1]),
+            last and self._endless,
+        )
 
     def _projection(self, camera: Camera, cascade: Cascade) -> Projection:
         """View whose grid of texels stands still in the world: it is moved by whole texels."""
-        region = self.lit_region(camera, cascade.far)
+        region = self._box_corners() if cascade.whole else self.lit_region(camera, cascade.far)
         across = self._across(region if len(region) else self._box_corners())
         middle = 0.5 * (across.min(axis=0) + across.max(axis=0) + self._pad[0] + self._pad[1])
         first = np.round(middle / cascade.texel - 0.5 * self.resolution)
@@ -205,6 +241,11 @@ class Cascades:
         if len(region):
             depths = region @ eye.matrix[2] + eye.offset[2]
         return max(float(depths.min()), eye.near), max(float(depths.max()), 2.0 * eye.near)
+
+
+def half_extent(points: Float64Array) -> Float64Array:
+    """Half the width of points ``[n, 2]``."""
+    return np.asarray(0.5 * (points.max(axis=0) - points.min(axis=0)))
 
 
 def iors(facts: Facts) -> tuple[float, float, float]:

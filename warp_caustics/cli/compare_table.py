@@ -89,8 +89,10 @@ def _cells(row: Row, *, with_flip: bool) -> list[str]:
     errors, eye, speed = row.errors, row.screen_errors, row.speed
     judged = errors or eye
     assert speed is not None
-    front = row.on_front or (errors is None and row.on_screen_front)
-    marks = (FRONT_MARK if front else " ") + (TIE_MARK if row.at_error_bar else " ")
+    front, tie = row.on_front, row.at_error_bar
+    if errors is None:  # judged in eye pixels alone
+        front, tie = row.on_screen_front, row.at_screen_error_bar
+    marks = (FRONT_MARK if front else " ") + (TIE_MARK if tie else " ")
     flip = [_shown(errors, "flip", "{:.4f}".format)] if with_flip else []
     spread = (speed.milliseconds_high - speed.milliseconds_low) / speed.milliseconds
     decimals = 1 if speed.milliseconds >= FEW_MILLISECONDS else 3

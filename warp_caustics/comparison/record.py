@@ -126,6 +126,7 @@ class Row(Part):
     on_screen_front: bool = Field(
         default=False, description="the same by the errors in eye pixels; times are of the maps, their look-up apart"
     )
+    at_screen_error_bar: bool = Field(default=False, description="the same in eye pixels, under the error bar there")
     at_error_bar: bool = Field(
         default=False, description="error under the reference's error bar: not told apart from others there"
     )

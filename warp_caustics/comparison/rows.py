@@ -121,14 +121,16 @@ def _speed(measured: Measured) -> Speed:
 def with_fronts(rows: Sequence[Row], truth: Truth) -> list[Row]:
     """Mark the rows on the fronts, of maps and of eye pixels, and those that the reference cannot tell apart."""
     bar, carried = truth.reference.error_bar, truth.carried
+    eye_bar = 0.0 if carried is None else carried.error_bar
     maps = _marks([row.errors for row in rows], rows, bar)
-    screens = _marks([row.screen_errors for row in rows], rows, 0.0 if carried is None else carried.error_bar)
+    screens = _marks([row.screen_errors for row in rows], rows, eye_bar)
     return [
         row.model_copy(
             update={
                 "on_front": on_map,
                 "on_screen_front": on_screen,
                 "at_error_bar": row.errors is not None and row.errors.relative_l2 < bar,
+                "at_screen_error_bar": row.screen_errors is not None and row.screen_errors.relative_l2 < eye_bar,
             }
         )
         for row, on_map, on_screen in zip(rows, maps, screens, strict=True)

@@ -29,6 +29,10 @@ TOLERANCE_PIXELS = 1.0
 """Footprints of its pixel that a photon may lie off the surface that is seen: the bend of the surface over a photon's
 pixels, and the chords of the eye's triangles. With twice as many, rough ground takes light of what it hides."""
 
+SIDE_ZONE = 0.04
+"""Share of a view's side over which the next cascade takes its place where the eye has turned away from it: less than
+:data:`~warp_caustics.cascades.ROOM` on each side, so that nothing of it is seen from where views were fitted."""
+
 GREEN = 1
 
 
@@ -87,14 +91,15 @@ def _layout(facts: Facts) -> Layout:
             f'method.cascaded.dispersion_photons: expected medium.dispersion "traced" with it, got '
             f'"{scene.medium.dispersion}"'
         )
-    backlund = settings.projection == "backlund"
+    backlund, published = settings.projection == "backlund", settings.brightness == "published"
     height_field = facts.spec.receiver in HEIGHT_FIELDS
     # A light view sees the same ground that a ray along the light meets; one of a plane is in closed form.
     ground = backlund and (facts.spec.receiver == "mesh" or (height_field and not facts.spec.objects))
     spec = CascadeSpec(
         scene=replace(
-            facts.spec, self_shadow=False, backlund=backlund and not ground, channels=3 if traced else
-            facts.spec.channels, accumulate=scene.method.accumulate,
+            facts.spec, self_shadow=False, backlund=backlund and not ground,
+            channels=3 if traced else 1 if published else facts.spec.channels, accumulate=scene.method.accumulate,
+            fresnel=facts.spec.fresnel and not published, attenuation="none" if published else facts.spec.attenuation,
         ),
         positions=settings.positions,
         normals=settings.normals,
@@ -135,13 +140,16 @@ def _tolerance(layout: Layout) -> tuple[float, float]:
 def _cascade_values(layout: Layout, number: int, cascade: Cascade) -> dict[str, Any]:
     """Give the plain parameters of one cascade."""
     facts, prefix = layout.facts, f"cascade{number}"
-    before = layout.cascades.cascades[number - 1] if number else None
     # A constant is a brightness already; a flux is that of a texel across the light.
-    size = cascade.texel_area * facts.sun_share if layout.settings.brightness == "flux" else 1.0
+    flux = layout.settings.brightness == "flux"
+    size = cascade.texel_area * facts.sun_share if flux else layout.settings.constant
+    side = float(layout.settings.resolution)
     scale = size * unit(layout.spec.scene.accumulate)
     values: dict[str, Any] = {
-        f"{prefix}.own": (cascade.far, cascade.zone),
-        f"{prefix}.before": (before.far, before.zone) if before else (-1.0, 0.0),
+        f"{prefix}.reach": (cascade.far, cascade.zone),
+        f"{prefix}.need": tuple(layout.cascades.need(cascade)),
+        f"{prefix}.side": 0.0 if number == layout.settings.count - 1 else side,
+        f"{prefix}.zone": SIDE_ZONE * side if layout.settings.blend > 0.0 else 0.0,
         f"{prefix}.scale": tuple(scale * facts.irradiance[c % layout.colours] for c in range(3)),
     }
     for of, margin in (("water", cascade.margin), ("ground", cascade.ground_margin)):
@@ -156,7 +164,7 @@ def _uploads(layout: Layout) -> dict[str, Callable[[str], Any]]:
 
     def ramps(device: str) -> Ramps:
         made = Ramps()
-        made.constant, made.least, made.most = settings.constant, settings.min_depth, settings.max_depth
+        made.least, made.most = settings.min_depth, settings.max_depth
         return made
 
     def ways(device: str) -> Any:
@@ -186,11 +194,14 @@ def _reasons(layout: Layout) -> Iterator[Reason]:
     """Say what is kept and what is left out: of the scene, and of this method."""
     settings, medium = layout.settings, layout.facts.scene.medium
     replaced = {"self-shadow": "the light view sees no water that a crest hides"}
+    if settings.brightness == "published":
+        replaced |= dict.fromkeys(("Fresnel", "attenuation", "transport by colour"), "its brightness is a constant")
     for reason in layout.facts.reasons:
         if reason.what in replaced:
             reason = Reason(reason.what, False, replaced[reason.what])
         yield reason
-    sizes = ", ".join(f"{1e3 * cascade.texel.max():.3g}" for cascade in layout.cascades.cascades)
+    texels = (1e3 * cascade.texel for cascade in layout.cascades.cascades)
+    sizes = ", ".join(f"{across:.3g} x {along:.3g}" for across, along in texels)
     yield Reason("cascades", True, f"{settings.count} light views, texels of {sizes} mm")
     exact = settings.projection == "exact"
     why_not = "the landing is exact" if exact else "the ground of a texel is had by a ray"

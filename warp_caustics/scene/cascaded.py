@@ -8,11 +8,13 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field
 
 from warp_caustics.scene.model import Model
-from warp_caustics.scene.values import Count, NonNegative, Positive, finite, one_of, that, whole
+from warp_caustics.scene.values import NonNegative, Positive, finite, one_of, that, whole
 
 MOST_CASCADES: Final = 16  # each takes a light view of its own; past some there is nothing left to make finer
 LEAST_TEXELS: Final = 16
 MOST_TEXELS: Final = 16384  # of the rasterizer's pictures: views.MAX_RESOLUTION, which a test compares
+
+MOST_RADIUS: Final = 64  # pixels: wider windows are no filter of noise any more
 
 PUBLISHED_KEYS: Final = ("ramp", "min_depth", "max_depth", "constant")
 
@@ -25,6 +27,7 @@ Texels = Annotated[
     ),
 ]
 Cascades = Annotated[int, that(whole, lambda n: 1 <= n <= MOST_CASCADES, f"a whole number from 1 to {MOST_CASCADES}")]
+Radius = Annotated[int, that(whole, lambda n: 1 <= n <= MOST_RADIUS, f"a whole number from 1 to {MOST_RADIUS}")]
 Share = Annotated[float, that(finite, lambda share: 0.0 <= share <= 1.0, "a number from 0 to 1")]
 
 
@@ -89,7 +92,7 @@ class CascadedSettings(Model):
     filter: Annotated[Literal["none", "blur", "bilateral"], one_of("none", "blur", "bilateral")] = Field(
         default="none", description="of the picture: none, a box blur, or a joint bilateral one by depth and normal"
     )
-    filter_radius: Count = Field(default=2, description="of the filter [pixels]; only with one")
+    filter_radius: Radius = Field(default=2, description="of the filter [pixels]; only with one")
 
     @classmethod
     def rules(cls, given: Mapping[str, Any]) -> Iterator[str]:
