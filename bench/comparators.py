@@ -10,7 +10,6 @@ JSON.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -104,8 +103,6 @@ def main() -> None:
         measured.append(row)
         print(line(row), flush=True)
     chosen.output.mkdir(parents=True, exist_ok=True)
-    about = {"resolution": chosen.resolution, "frames": chosen.frames, "warp": wp.config.version, "rows": measured}
-    (chosen.output / "comparators.json").write_text(json.dumps(about, indent=1) + "\n")
     (chosen.output / "comparators.md").write_text("\n".join([begin, *map(line, measured)]) + "\n")
 
 
