@@ -12,8 +12,9 @@ from scenery import GENTLE, scene
 
 import warp_caustics as wc
 from oracle.cases import sunlight
-from warp_caustics.cascades import Cascades, box_planes, frustum_radius, polytope_corners
+from warp_caustics.cascades import Cascades
 from warp_caustics.plan import make_plan
+from warp_caustics.polytope import box_planes, frustum_radius, polytope_corners
 from warp_caustics.scene import Camera
 from warp_caustics.scene.cascaded import MOST_TEXELS
 from warp_caustics.sun import refract_slopes

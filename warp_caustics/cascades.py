@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from itertools import combinations, product
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +19,7 @@ import numpy as np
 from .dispersion import CHANNELS, channel_scene
 from .errors import InputError
 from .eye import eye_view
+from .polytope import box_planes, frustum_planes, frustum_radius, half_extent, polytope_corners
 from .receiver import receiver_kind
 from .sun import refract_slopes
 from .views import Float64Array, Projection, light_axes
@@ -35,12 +36,6 @@ the texels' own, which are no more than points of it, times four, and the triang
 
 SNAP_TEXELS = 2
 """Texels by which a view is wider than what it must hold: snapping moves it by half of one, and edges round."""
-
-INSIDE = 1e-9
-"""Share of a polytope's size by which its corners may lie outside its own planes: a few roundings of float64."""
-
-DETERMINANT = 1e-12
-"""Below it three planes, of unit normals, meet in no point."""
 
 ROOM = 0.05
 """Share by which a view is wider on each side than what the scene's camera sees of its cascade: an eye that turns a
@@ -243,11 +238,6 @@ class Cascades:
         return max(float(depths.min()), eye.near), max(float(depths.max()), 2.0 * eye.near)
 
 
-def half_extent(points: Float64Array) -> Float64Array:
-    """Half the width of points ``[n, 2]``."""
-    return np.asarray(0.5 * (points.max(axis=0) - points.min(axis=0)))
-
-
 def iors(facts: Facts) -> tuple[float, float, float]:
     """Index of refraction of each channel: green's for all without dispersion.
 
@@ -288,44 +278,3 @@ def scene_box(facts: Facts) -> tuple[Float64Array, Float64Array]:
                 np.minimum(low, at.min(axis=0)), np.maximum(high, at.max(axis=0)))  # fmt: skip
     top = max(min(facts.ground.highest, facts.amplitude), facts.ground.lowest)
     return np.array([*low, facts.ground.lowest]), np.array([*high, top])
-
-
-def frustum_planes(eye: Projection, far: float) -> Float64Array:
-    """Planes ``[6, 4]`` of an eye's frustum up to a depth: ``n . x + d >= 0`` inside, n of length 1."""
-    columns, rows = eye.resolution
-    x, y, z = np.concatenate([eye.matrix, eye.offset[:, None]], axis=1)
-    end = np.array([0.0, 0.0, 0.0, 1.0])
-    planes = np.stack([x, columns * z - x, y, rows * z - y, z - eye.near * end, far * end - z])
-    return planes / np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
-
-
-def box_planes(low: Float64Array, high: Float64Array) -> Float64Array:
-    """Planes ``[6, 4]`` of an upright box."""
-    axes = np.eye(3)
-    return np.concatenate([np.c_[axes, -low], np.c_[-axes, high]])
-
-
-def polytope_corners(planes: Float64Array) -> Float64Array:
-    """Corners ``[n, 3]`` of the convex set inside all planes ``[m, 4]``: where three meet and no other cuts them off.
-
-    A flat set has its corners, too. Twelve planes have 220 triples, fewer than a clipper has lines.
-    """
-    triples = np.array(list(combinations(range(len(planes)), 3)))
-    normals, offsets = planes[triples, :3], planes[triples, 3]
-    meet = np.abs((np.cross(normals[:, 0], normals[:, 1]) * normals[:, 2]).sum(axis=1)) > DETERMINANT
-    points = np.linalg.solve(normals[meet], -offsets[meet][..., None])[..., 0]
-    size = 1.0 + np.abs(points).max(axis=1, initial=0.0)
-    inside = (points @ planes[:, :3].T + planes[:, 3] >= -INSIDE * size[:, None]).all(axis=1)
-    return np.asarray(points[inside])
-
-
-def frustum_radius(eye: Projection, far: float) -> float:
-    """Radius of the least sphere around an eye's frustum up to a depth [m], whichever way it looks.
-
-    Around a pyramid whose edges lean by the angle a from its axis: ``far tan a`` past 45 degrees, else
-    ``far / (2 cos^2 a)``; the piece before the near plane is too small to count.
-    """
-    columns, rows = eye.resolution
-    focal = math.sqrt(abs(np.linalg.det(eye.matrix)))
-    tangent = math.hypot(columns, rows) / (2.0 * focal)
-    return far * (tangent if tangent >= 1.0 else 0.5 * (1.0 + tangent**2))
