@@ -11,7 +11,7 @@ PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 help:
 	@echo "make demo   render the bundled beach into $(OUT)/"
 	@echo "make test   run the whole test suite"
-	@echo "make bench  measure error, time and memory into bench/results/, half an hour"
+	@echo "make bench  measure error, time and memory into bench/results/ and docs/tables/, hours"
 	@echo "make lint   ruff and mypy"
 	@echo "make clean  remove what the other targets made, except $(VENV)/"
 
@@ -22,7 +22,7 @@ demo: $(VENV)/.installed
 test: $(VENV)/.installed-test
 	$(BIN)/python -m pytest
 
-# Half an hour on two cores. Mitsuba is measured where it is installed (`pip install '.[peer]'`).
+# The comparisons of two scenes alone are ten minutes on two cores, and the largest light views a minute a frame. Mitsuba is measured where it is installed (`pip install '.[peer]'`).
 bench: $(VENV)/.installed-test
 	@set -e; folder="$$($(BIN)/python bench/compare_scenes.py --folder)"; \
 	  $(BIN)/python bench/compare_scenes.py; \

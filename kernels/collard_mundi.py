@@ -12,13 +12,6 @@ WATER_COLOUR = wp.constant(wp.vec3(0.0, 112.5 / 255.0, 1.0))
 WATER_TINT = wp.constant(0.25)
 """Of the water's colour that is added to the ground."""
 
-LIGHT_POSITION = (2.5, 10.0, 5.0)
-"""Theirs is (2.5, 5, -10) with y up: here with z up. Of a square of water 4 wide, whose middle at rest is the origin:
-other scenes scale it by their size / 4."""
-
-LIGHT_SPAN = 4.0
-"""Width of the water that :data:`LIGHT_POSITION` belongs to."""
-
 AMBIENT = wp.constant(0.1)
 SHININESS = wp.constant(256.0)
 FULL_SPECULAR = wp.constant(0.3)

@@ -12,8 +12,6 @@ from .deposit import ACCUMULATOR, FLUX, make_add
 from .eye_surface import lies_on
 from .views import View, project
 
-FOOTPRINTS = ("point", "pixel", "texel")
-
 SPREAD = wp.constant(1.5535)
 """Radius of a texel's footprint in texels. The transform of (1 - r^2)^2 over a disk is 48 J3(k)/k^3 of k = 2 pi SPREAD,
 and this is its second zero, 9.761: the ripple that a lattice of footprints would leave on even light vanishes."""
