@@ -10,6 +10,7 @@ import functools
 import warp as wp
 
 from .deposit import ACCUMULATOR, FLUX, make_add
+from .edges import make_put_flux
 
 NEEDLE = wp.constant(1.0e-4)
 """Area over extent below which a triangle is a line to float32: the overlap's rounding, 1e-7, is 1e-3 of its area."""
@@ -76,9 +77,13 @@ def row_extent(e: wp.vec3, f: wp.vec3, g: wp.vec3) -> wp.vec2:
 
 
 @functools.cache
-def make_deposit_point(accumulate: str, channels: int) -> wp.Function:
-    """Put a flux into the pixel that a point falls in; return the share that fell in the map (0 or 1)."""
+def make_deposit_point(accumulate: str, channels: int, steps: bool = False) -> wp.Function:
+    """Put a flux into the pixel that a point falls in, of a map or of a map of steps (:mod:`.edges`).
+
+    It returns the share that fell in the map (0 or 1).
+    """
     add = make_add(accumulate, channels)
+    put_flux = make_put_flux(channels)
     dtype = ACCUMULATOR[accumulate]
 
     @wp.func
@@ -89,16 +94,19 @@ def make_deposit_point(accumulate: str, channels: int) -> wp.Function:
         row = base[1] + int(wp.floor(p[1]))
         if column < 0 or column >= size[0] or row < 0 or row >= size[1]:
             return 0.0
-        add(map, row * size[0] + column, flux, share)
+        if wp.static(steps):
+            put_flux(map, row * (size[0] + 1) + column, flux, share)
+        else:
+            add(map, row * size[0] + column, flux, share)
         return share
 
     return deposit_point
 
 
 @functools.cache
-def make_deposit_needle(accumulate: str, channels: int) -> wp.Function:
+def make_deposit_needle(accumulate: str, channels: int, steps: bool = False) -> wp.Function:
     """Spread a flux along a triangle without area, as points at the centroids of its equal parts."""
-    deposit_point = make_deposit_point(accumulate, channels)
+    deposit_point = make_deposit_point(accumulate, channels, steps)
     dtype = ACCUMULATOR[accumulate]
 
     @wp.func

@@ -12,6 +12,7 @@ import warp as wp
 
 from .coverage import make_deposit_triangle
 from .deposit import ACCUMULATOR, FLUX
+from .edge_triangle import in_map, make_deposit_edged_triangle
 from .lattice import Lattice, at_rest, clip_to_water, on_water, pixel_base, pixel_fraction, share_of_cell
 from .ledger import EMITTED, OVER_LIT, SHADED, make_book_landed, make_count_unlanded, tally
 from .optics import facing, refract_at_slope
@@ -43,16 +44,17 @@ def footprint_corner(scene: Scene, sun: wp.vec3, photon: Photon, z: vec6, dx: fl
 
 
 @functools.cache
-def make_torn(spec: Spec) -> wp.Kernel:
-    """Deposit the flagged cells of a strip."""
+def make_torn(spec: Spec, edges: bool) -> wp.Kernel:
+    """Deposit the flagged cells of a strip; ``edges`` as in :func:`.beam.make_cells`."""
     water_at = HEIGHT_SLOPE_AND_CURVATURE[spec.water]
     lit = make_lit(spec)
     wet = make_wet(spec)
     land = make_land(spec)
-    deposit_triangle = make_deposit_triangle(spec.accumulate, spec.channels)
+    plain = make_deposit_triangle(spec.accumulate, spec.channels)
+    deposit_triangle = make_deposit_edged_triangle(spec.channels) if edges else plain
     book_landed = make_book_landed(spec)
     count_unlanded = make_count_unlanded(spec)
-    dtype = ACCUMULATOR[spec.accumulate]
+    dtype = ACCUMULATOR["float64" if edges else spec.accumulate]
     flux_type = FLUX[spec.channels]
     channels, self_shadow, bounded = spec.channels, spec.self_shadow, spec.bounded
     parts = PARTS_WITH_EXITS if spec.exits else PARTS
@@ -118,8 +120,14 @@ def make_torn(spec: Spec) -> wp.Kernel:
         flux = flux_type()
         for k in range(wp.static(channels)):
             flux[k] = share * photon.arrived[k]
-        inside = 0.5 * deposit_triangle(map, lattice.map, base, a, b, c, 0.5 * flux)
-        inside += 0.5 * deposit_triangle(map, lattice.map, base, a, c, d, 0.5 * flux)
+        if wp.static(edges):
+            p = in_map(base, a)
+            q = in_map(base, c)
+            inside = 0.5 * deposit_triangle(map, lattice.map, p, in_map(base, b), q, 0.5 * flux)
+            inside += 0.5 * deposit_triangle(map, lattice.map, p, q, in_map(base, d), 0.5 * flux)
+        else:
+            inside = 0.5 * deposit_triangle(map, lattice.map, base, a, b, c, 0.5 * flux)
+            inside += 0.5 * deposit_triangle(map, lattice.map, base, a, c, d, 0.5 * flux)
         book_landed(ledger, bin, share * photon.incident, share * photon.transmitted, flux, inside * flux)
 
     @wp.kernel(module="unique", enable_backward=False)

@@ -104,7 +104,7 @@ def follow_all(scene, device):
     ledger = wp.zeros((len(ENTRIES), BINS), dtype=wp.float64, device=device)
     flags = wp.full((lattice.count[1], lattice.count[0]), value=1, dtype=wp.uint8, device=device)
     inputs = [state.scene, state.suns, 0, state.lattice(lattice), lattice.first[1], flags]
-    kernel = make_torn(facts.spec)
+    kernel = make_torn(facts.spec, edges=False)
     wp.launch(kernel, dim=flags.shape, inputs=inputs, outputs=[image, ledger], device=device)
     entries = dict(zip(ENTRIES, ledger.numpy().sum(axis=1), strict=True))
     return image.numpy().reshape(rows, columns) * lattice.step**2, entries, lattice
