@@ -37,6 +37,7 @@ def make_intersections(spec: Spec) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def intersections(
         # In:
+        begin: int,
         scene: Scene,
         suns: wp.array[SunSample],
         sun: int,
@@ -48,8 +49,12 @@ def make_intersections(spec: Spec) -> wp.Kernel:
         flux_out: wp.array2d[flux_type],
         ledger_out: wp.array2d[wp.float64],
     ):
-        """One thread a sample; launch dims (rows, columns) of the lattice; landings in pixels from the sample's own."""
+        """One thread a sample; launch dims (rows, columns) of the lattice, from row ``begin``.
+
+        Landings are in pixels from the sample's own.
+        """
         row, column = wp.tid()
+        row += begin
         light = suns[sun]
         index = wp.vec2i(lattice.first[0] + column, lattice.first[1] + row)
         pixel = at_rest(lattice, index, 0.5)
@@ -97,6 +102,7 @@ def make_rows(channels: int) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def rows(
         # In:
+        begin: int,
         landing: wp.array2d[wp.vec2],
         flux: wp.array2d[flux_type],
         first: wp.vec2i,
@@ -108,9 +114,10 @@ def make_rows(channels: int) -> wp.Kernel:
         """One thread a pixel of a column of the map that reaches m / 2 rows past it; launch dims (rows, columns).
 
         ``channel_out[j, row, column]`` is what row ``row`` gives to the pixel ``j - m / 2`` rows above it; ``first`` is
-        the sample (column, row) at which the window of the first thread's pixel begins.
+        the sample (column, row) at which the window of the pixel of row 0 and column 0 begins. Rows from ``begin``.
         """
         row, column = wp.tid()
+        row += begin
         for j in range(m + 1):
             channel_out[j, row, column] = flux_type()
         for i in range(n):
@@ -135,13 +142,15 @@ def make_columns(channels: int) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def columns(
         # In:
+        begin: int,
         channel: wp.array3d[flux_type],
         m: int,
         # Out:
         map_out: wp.array[float],
     ):
-        """One thread a pixel of the map; launch dims (rows, columns)."""
+        """One thread a pixel of the map, from row ``begin``; launch dims (rows, columns)."""
         row, column = wp.tid()
+        row += begin
         total = flux_type()
         for j in range(m + 1):
             # Row r of the channels is map row r - m / 2: what lies j - m / 2 below gives through channel j.

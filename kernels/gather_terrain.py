@@ -53,6 +53,7 @@ def make_gather_terrain(spec: Spec) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def gather_terrain(
         # In:
+        begin: int,
         scene: Scene,
         suns: wp.array[SunSample],
         sun: int,
@@ -67,13 +68,15 @@ def make_gather_terrain(spec: Spec) -> wp.Kernel:
         # Out:
         map_out: wp.array[float],
     ):
-        """One thread a pixel of the map; launch dims (rows, columns); landings in pixels from the sample's own.
+        """One thread a pixel of the map, from row ``begin``; launch dims (rows, columns).
 
+        Landings are in pixels from the sample's own.
         ``way_low`` and ``way_high`` bound the horizontal way of refracted light by unit depth, over every slope of the
         water and direction of the sun; ``spread`` bounds by how much more or less than the depth of the pixel's ground
         light comes down that lands on it [m].
         """
         row, column = wp.tid()
+        row += begin
         light = suns[sun]
         pixel = lattice.pixel
         x = (float(column) + 0.5) * pixel[0]

@@ -1,4 +1,6 @@
-"""Yuksel & Keyser's two passes: by hand, against the direct sum, and against the splat of a unit box; their errata."""
+"""The gather's forms: by hand, against the direct sum, and against the splat of a unit box; the paper's errata."""
+
+import functools
 
 import numpy as np
 import pytest
@@ -10,34 +12,79 @@ from kernel_helpers import rounded
 import warp_caustics as wc
 from warp_caustics.kernels.deposit import FLUX
 from warp_caustics.kernels.gather import make_columns, make_rows
+from warp_caustics.kernels.gather_fused import TILE, make_fused, make_tile, tile_threads
+from warp_caustics.kernels.gather_scatter import make_deposit_window
+from warp_caustics.kernels.lattice import Lattice
 
+FORMS = ("two_pass", "fused", "scatter")
 # A few dozen float32 products of numbers up to one, added up.
 SUM_TOLERANCE = 2e-6
 # Two orders of adding the same float32 numbers, landings rounded to 1e-6 of a pixel, relative to the mean.
 SPLAT_TOLERANCE = 1e-5
 
 
-def gather(landing, flux, n, m, resolution, device, before=None):
-    """Both passes over samples [rows + m, columns + n - 1]: landings [..., 2], fluxes [..., channels]."""
+def gather(landing, flux, n, m, resolution, device, before=None, form="two_pass"):
+    """A form of the sum over samples [rows + m, columns + n - 1]: landings [..., 2], fluxes [..., channels]."""
     (columns, rows), channels = resolution, flux.shape[-1]
     assert landing.shape == (rows + m, columns + n - 1, 2)
     dtype = FLUX[channels]
     shape = landing.shape[:2]
     samples = wp.array(np.ascontiguousarray(landing, np.float32), dtype=wp.vec2, shape=shape, device=device)
     light = wp.array(np.ascontiguousarray(flux, np.float32), dtype=dtype, shape=shape, device=device)
-    # Filled with rubbish: the first pass must not add to what a frame before has left.
-    channel = wp.full((m + 1, rows + m, columns), value=dtype(7.0), dtype=dtype, device=device)
     start = np.zeros(rows * columns * channels) if before is None else before.ravel()
     out = wp.array(start.astype(np.float32), dtype=float, device=device)
-    wp.launch(
-        make_rows(channels),
-        dim=(rows + m, columns),
-        inputs=[samples, light, wp.vec2i(0, 0), n, m],
-        outputs=[channel],
-        device=device,
-    )
-    wp.launch(make_columns(channels), dim=(rows, columns), inputs=[channel, m], outputs=[out], device=device)
+    lattice = Lattice()
+    lattice.map, lattice.first = wp.vec2i(*resolution), wp.vec2i(-(n // 2), -(m // 2))
+
+    def launch(kernel, dim, *inputs, outputs=None):
+        wp.launch(kernel, dim=dim, inputs=list(inputs), outputs=[out] if outputs is None else outputs, device=device)
+
+    first = wp.vec2i(0, 0)
+    if form == "two_pass":
+        # Filled with rubbish: the first pass must not add to what a frame before has left.
+        channel = wp.full((m + 1, rows + m, columns), value=dtype(7.0), dtype=dtype, device=device)
+        launch(make_rows(channels), (rows + m, columns), 0, samples, light, first, n, m, outputs=[channel])
+        launch(make_columns(channels), (rows, columns), 0, channel, m)
+    elif form == "fused":
+        launch(make_fused(channels), (rows, columns), 0, lattice, samples, light, first, n, m)
+    elif form == "tile":
+        tiles = -(-rows // TILE), -(-columns // TILE), tile_threads(device)
+        launch(make_tile(channels, n, m), tiles, 0, lattice, samples, light, first)
+    else:
+        inside = wp.zeros(shape, dtype=float, device=device)
+        launch(make_deposit(channels), shape, lattice, samples, light, n, m, outputs=[out, inside])
+        assert np.abs(inside.numpy() - share_in_map(landing, n, m, resolution)).max() < SUM_TOLERANCE
     return out.numpy().reshape(rows, columns, channels).astype(np.float64)
+
+
+@functools.cache
+def make_deposit(channels):
+    """The scatter's box, of samples that are given."""
+    deposit_window = make_deposit_window(channels)
+    flux_type = FLUX[channels]
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def deposit(
+        lattice: Lattice, landing: wp.array2d[wp.vec2], flux: wp.array2d[flux_type], n: int, m: int,
+        map_out: wp.array[float], inside_out: wp.array2d[float],
+    ):  # fmt: skip
+        row, column = wp.tid()
+        own = wp.vec2i(lattice.first[0] + column, lattice.first[1] + row)
+        inside_out[row, column] = deposit_window(
+            map_out, lattice.map, own, landing[row, column], n, m, flux[row, column]
+        )
+
+    return deposit
+
+
+def share_in_map(landing, n, m, resolution):
+    """The part of each sample's box that lies in the map, whatever the windows hold."""
+    share = np.ones(landing.shape[:2])
+    for axis, half in ((0, n // 2), (1, m // 2)):
+        at = np.arange(landing.shape[1 - axis]) - half
+        middle = landing[..., axis] + (at if axis == 0 else at[:, None]) + 0.5
+        share *= np.maximum(0.0, np.minimum(middle + 0.5, resolution[axis]) - np.maximum(middle - 0.5, 0.0))
+    return np.nan_to_num(share)
 
 
 def direct_sum(landing, flux, n, m, resolution):
@@ -109,14 +156,25 @@ def test_channels_are_fetched_from_the_side_they_were_sent_from(device):
 
 @pytest.mark.parametrize(("n", "m"), [(1, 2), (3, 2), (7, 6), (5, 2), (3, 8), (7, 2)])
 @pytest.mark.parametrize("channels", [1, 3])
-def test_two_passes_equal_the_direct_sum(device, n, m, channels):
+@pytest.mark.parametrize("form", FORMS)
+def test_each_form_equals_the_direct_sum(device, form, n, m, channels):
     """Also where light lands outside the window, and where the window is not square."""
     resolution = (7, 5)
     landing, flux = samples(n, m, resolution, 4.5, channels, seed=n + 10 * m)
-    found = gather(landing, flux, n, m, resolution, device)
+    found = gather(landing, flux, n, m, resolution, device, form=form)
     expected = direct_sum(landing, flux, n, m, resolution)
     assert expected.max() > 0.1
     assert np.abs(found - expected).max() < SUM_TOLERANCE * max(1.0, expected.max())
+
+
+@pytest.mark.parametrize(("n", "m", "channels"), [(3, 8, 1), (7, 6, 3)])
+def test_tiles_equal_the_direct_sum(device, n, m, channels):
+    """Over several tiles, the last of which reach past the map and past the samples."""
+    resolution = (TILE + 5, TILE + 3)
+    landing, flux = samples(n, m, resolution, 4.5, channels, seed=3)
+    found = gather(landing, flux, n, m, resolution, device, form="tile")
+    expected = direct_sum(landing, flux, n, m, resolution)
+    assert np.abs(found - expected).max() < SUM_TOLERANCE * expected.max()
 
 
 @pytest.mark.parametrize(("reach", "n", "m"), [(0.9, 3, 2), (2.9, 7, 6), (3.0, 7, 6)])
@@ -137,34 +195,36 @@ def test_a_window_that_is_too_small_misses_light(device):
     assert found.sum() < 0.999 * expected.sum()
 
 
-def test_passes_add_to_the_map(device):
+@pytest.mark.parametrize("form", (*FORMS, "tile"))
+def test_passes_add_to_the_map(device, form):
     """Each direction of the sun adds its light to that of the ones before."""
     landing, flux = samples(3, 2, (4, 4), 0.9, 3, seed=7)
     before = rounded(np.random.default_rng(1).random((4, 4, 3)))
     fresh = gather(landing, flux, 3, 2, (4, 4), device)
-    assert gather(landing, flux, 3, 2, (4, 4), device, before) == pytest.approx(before + fresh, abs=SUM_TOLERANCE)
+    assert gather(landing, flux, 3, 2, (4, 4), device, before, form) == pytest.approx(before + fresh, abs=SUM_TOLERANCE)
 
 
-def test_a_landing_that_is_no_number_lights_nothing(device):
+@pytest.mark.parametrize("form", FORMS)
+def test_a_landing_that_is_no_number_lights_nothing(device, form):
     landing, flux = samples(3, 2, (4, 4), 0.9, 1, seed=2)
     spoilt = landing.copy()
     spoilt[2, 2], spoilt[3, 3, 0], spoilt[1, 1, 1], spoilt[4, 2] = np.nan, np.nan, np.nan, np.inf
     dark = flux.copy()
     for at in ((2, 2), (3, 3), (1, 1), (4, 2)):
         dark[at] = 0.0
-    found = gather(spoilt, flux, 3, 2, (4, 4), device)
+    found = gather(spoilt, flux, 3, 2, (4, 4), device, form=form)
     assert found == pytest.approx(gather(landing, dark, 3, 2, (4, 4), device), abs=SUM_TOLERANCE)
 
 
 @settings(deadline=None, max_examples=30)
 @given(
     n=st.sampled_from([1, 3, 5]), m=st.sampled_from([2, 4]), columns=st.integers(1, 4), rows=st.integers(1, 4),
-    reach=st.floats(0.0, 6.0), seed=st.integers(0, 99),
+    reach=st.floats(0.0, 6.0), seed=st.integers(0, 99), form=st.sampled_from(FORMS),
 )  # fmt: skip
-def test_two_passes_equal_the_direct_sum_for_any_window_and_map(n, m, columns, rows, reach, seed):
+def test_each_form_equals_the_direct_sum_for_any_window_and_map(n, m, columns, rows, reach, seed, form):
     landing, flux = samples(n, m, (columns, rows), reach, 1, seed)
     expected = direct_sum(landing, flux, n, m, (columns, rows))
-    found = gather(landing, flux, n, m, (columns, rows), "cpu")
+    found = gather(landing, flux, n, m, (columns, rows), "cpu", form=form)
     assert np.abs(found - expected).max() < SUM_TOLERANCE * max(1.0, expected.max())
 
 

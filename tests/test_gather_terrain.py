@@ -78,7 +78,7 @@ def gather(landing, flux, n, m, low, high, device, before=None, amplitude=0.0):
         make_gather_terrain(Spec(receiver="waves", channels=channels)),
         dim=(RESOLUTION[1], RESOLUTION[0]),
         inputs=[
-            world, wp.array([sun], dtype=SunSample, device=device), 0, lattice(FIRST, COUNT, 1.0, PIXEL, RESOLUTION),
+            0, world, wp.array([sun], dtype=SunSample, device=device), 0, lattice(FIRST, COUNT, 1.0, PIXEL, RESOLUTION),
             wp.vec2(*low), wp.vec2(*high), amplitude + STEEPEST * np.hypot(*PIXEL), n, m, samples, light,
         ],
         outputs=[out],
@@ -219,8 +219,9 @@ def test_windows_hold_what_a_cut_cell_of_the_waters_border_lands(device, tmp_pat
 @pytest.mark.parametrize("window", [{}, {"n": 1}, {"n": 3, "m": 4}])
 def test_a_flat_terrain_is_the_plane(device, window, tmp_path):
     """By any window, so that both also miss the same light; the plane goes by the two passes as published."""
-    method, heights = {"gather": window}, save_heights(tmp_path, "flat", np.zeros((8, 8)), (-9.0, -9.0), (20.0, 20.0))
-    plane = render(scene(GENTLE, method=method), "gather", device)
+    method, published = {"gather": window}, {"gather": {**window, "form": "two_pass"}}
+    heights = save_heights(tmp_path, "flat", np.zeros((8, 8)), (-9.0, -9.0), (20.0, 20.0))
+    plane = render(scene(GENTLE, method=published), "gather", device)
     assert "columns" in plane.plan.kernels
     for terrain in ({"base": 0.0}, heights):
         found = render(scene(GENTLE, {"terrain": terrain}, method=method), "gather", device)
@@ -274,6 +275,9 @@ def test_colour_is_three_single_gathers(device, receiver):
 
 def test_no_channel_is_kept_between_passes_on_a_terrain():
     """The widest buffers of the two passes are not there."""
-    plans = [wc.make_plan(scene(GENTLE, receiver), "gather", "cpu", 1) for receiver in (None, BUMPS)]
+    plans = [
+        wc.make_plan(scene(GENTLE, receiver, method={"gather": {"form": form}}), "gather", "cpu", 1)
+        for receiver, form in ((None, "two_pass"), (BUMPS, "auto"))
+    ]
     assert ["channel" in {buffer.name for buffer in plan.buffers} for plan in plans] == [True, False]
     assert "illumination centre" in str(plans[1])

@@ -1,7 +1,7 @@
 """``gather``: Yuksel & Keyser's gather over windows of the surface. Plan view, a flat receiver or a terrain.
 
-On a plane it is their two passes. On a terrain each pixel has an illumination centre of its own, and one pass adds up
-its window; the intersections are the same.
+On a plane it is their two passes, or one of the other forms of the same sum. On a terrain each pixel has an
+illumination centre of its own, and one pass adds up its window; the intersections are the same.
 """
 
 from __future__ import annotations
@@ -13,8 +13,11 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels.gather import make_columns, make_intersections, make_rows
+from ..kernels.gather_fused import SHARED_BYTES, TILE, make_fused, make_tile, shared_bytes, tile_threads
+from ..kernels.gather_rows import make_scatter_rows, serves
+from ..kernels.gather_scatter import make_gather_scatter
 from ..kernels.gather_terrain import make_gather_terrain
-from ..program import Buffer, Pass, Program, WavePass, wave_pass
+from ..program import Buffer, Pass, Program, WavePass, strip_rows, wave_pass, wave_plane_pass
 from ..receiver import receiver_bounds
 from ..specify import HEIGHT_FIELDS
 from ..window import INDEX_BOUND, TOO_FAR, Lattice, deviation_bounds, lattice_over
@@ -33,6 +36,12 @@ CUT_REACH = 0.5
 
 CENTRE_ROUNDED = 0.5
 """The sample nearest to an illumination centre is off it by up to half a pixel; on a plane it is the centre."""
+
+STRIP_ROWS, LEAST_ROWS = 160, 32
+"""Rows of a strip at most, but for frames of very many; and at least: each strip makes tables of its own."""
+
+EVEN = 8
+"""Strips come in multiples of this, so that 2, 4 or 8 threads have as many each."""
 
 MOST_LOOKS = 2**44
 """Samples that all pixels of a terrain look at: at a nanosecond each, a core goes through them in five hours."""
@@ -62,36 +71,96 @@ def gather(facts: Facts) -> Program:
 
 
 def _on_plane(facts: Facts) -> Program:
-    """The two passes as published: the light of a row is first gathered for the columns that it crosses."""
-    channels, (columns, rows) = facts.spec.channels, facts.scene.map.resolution
+    """One of the forms of the same sum over windows that are the same for all pixels."""
     needed = _counted(np.maximum(-facts.deviation[0], facts.deviation[1]) + BOX_REACH)
     n, m = _window(facts, needed)
     left, below = max(n // 2, needed[0]), max(m // 2, needed[1])
+    columns, rows = facts.scene.map.resolution
     lattice = Lattice((-left, -below), (columns + 2 * left, rows + 2 * below), 1.0)
+    form = facts.scene.method.gather.form
+    if form == "auto":
+        # Four additions a sample, however wide the windows are, and on a CPU spread over all threads.
+        form = "scatter_rows" if facts.device == "cpu" and serves(facts.spec) else "scatter"
+    if form in ("scatter", "scatter_rows"):
+        program = _scatter(facts, form, lattice)
+    else:
+        program = _of_intersections(facts, form, lattice, n, m)
+    return replace(program, values={**program.values, "n": n, "m": m}, settings={"n": n, "m": m, "form": form})
+
+
+def _of_intersections(facts: Facts, form: str, lattice: Lattice, n: int, m: int) -> Program:
+    """The forms in which a pixel looks at intersections that a pass before has computed."""
+    channels, (columns, rows) = facts.spec.channels, facts.scene.map.resolution
     samples = _samples(facts, lattice)
-    return Program(
-        lattice=lattice,
-        strip_rows=lattice.count[1],
-        passes=(
-            *samples.passes,
+    passes: tuple[Pass, ...]
+    channel = Buffer("channel", f"vec{channels}", (m + 1, rows + m, columns), 4 * channels)
+    if form == "two_pass":
+        passes = (
             Pass("rows", f"gather pass 1: {n} samples in a row, for {m + 1} pixels of a column",
                  lambda: make_rows(channels), lambda _: (rows + m, columns)),
             Pass("columns", f"gather pass 2: {m + 1} channels of a column", lambda: make_columns(channels),
                  lambda _: (rows, columns)),
-        ),
-        buffers=(
-            *samples.buffers,
-            Buffer("channel", f"vec{channels}", (m + 1, rows + m, columns), 4 * channels),
-        ),
-        values={**samples.values, "first": (left - n // 2, below - m // 2), "n": n, "m": m},
-        settings={"n": n, "m": m},
+        )  # fmt: skip
+    elif form == "fused":
+        does = f"gather: {n} x {m + 1} samples around each pixel"
+        passes = (Pass("fused", does, lambda: make_fused(channels), lambda _: (rows, columns)),)
+    else:
+        passes = (_tile_pass(facts, n, m),)
+    return Program(
+        lattice=lattice,
+        strip_rows=lattice.count[1],
+        passes=(*samples.passes, *passes),
+        buffers=(*samples.buffers, channel) if form == "two_pass" else samples.buffers,
+        values={**samples.values, "begin": 0, "first": (-lattice.first[0] - n // 2, -lattice.first[1] - m // 2)},
         banded=False,
     )  # fmt: skip
+
+
+def _tile_pass(facts: Facts, n: int, m: int) -> Pass:
+    channels, (columns, rows) = facts.spec.channels, facts.scene.map.resolution
+    taken = shared_bytes(channels, n, m)
+    if taken > SHARED_BYTES:
+        raise InputError(
+            f'method.gather.form = "tile": windows of {n} x {m + 1} samples take {taken:,} bytes of shared memory, '
+            f"more than the {SHARED_BYTES:,} that every device has; expected narrower windows (method.gather.n), or "
+            'form "fused" or "scatter"'
+        )
+    tiles = -(-rows // TILE), -(-columns // TILE), tile_threads(facts.device)
+    does = f"gather: {n} x {m + 1} samples around each pixel, from shared memory"
+    return Pass("gather_tile", does, lambda: make_tile(channels, n, m), lambda _: tiles)
+
+
+def _scatter(facts: Facts, form: str, lattice: Lattice) -> Program:
+    """The other side of the sum: each sample is followed, and adds its box to the pixels whose windows hold it."""
+    spec, columns = facts.spec, lattice.count[0]
+    strips = EVEN * -(-lattice.count[1] // (EVEN * STRIP_ROWS))
+    rows = strip_rows(max(LEAST_ROWS, -(-lattice.count[1] // strips)), lattice, len(facts.suns))
+    does = "waves, refraction, landing of each sample, and its box on the pixels whose windows hold it"
+    if form == "scatter":
+        waves = wave_pass(spec, lattice, facts.waves, rows, 0, 0.5)
+        step = Pass("gather_scatter", does, lambda: make_gather_scatter(spec), lambda strip: (strip, columns))
+    elif serves(spec):
+        waves = wave_plane_pass(lattice, facts.waves, rows)
+        step = Pass("scatter_rows", does, lambda: make_scatter_rows(spec.fresnel), lambda strip: (strip,), columns)
+    else:
+        raise InputError(
+            'method.gather.form = "scatter_rows": it is for a sum of waves over a plane where light is neither shaded '
+            'nor absorbed on its way; expected "auto" or "scatter"'
+        )
+    return Program(
+        lattice=lattice, strip_rows=rows, passes=(*waves.passes, step), buffers=waves.buffers, values=waves.values
+    )
 
 
 def _on_terrain(facts: Facts) -> Program:
     """One pass: each pixel gathers around the illumination centre of its own ground."""
     spec, (columns, rows) = facts.spec, facts.scene.map.resolution
+    form = facts.scene.method.gather.form
+    if form != "auto":
+        raise InputError(
+            f'method.gather.form = "{form}": on a terrain each pixel has a window of its own, and there is one form of '
+            "their sum; leave it out"
+        )
     spread = _spread(facts)
     needed = _counted(_deepest_deviation(facts, spread) + CENTRE_ROUNDED + BOX_REACH)
     n, m = _window(facts, needed)
@@ -115,7 +184,8 @@ def _on_terrain(facts: Facts) -> Program:
                  lambda: make_gather_terrain(spec), lambda _: (rows, columns)),
         ),
         buffers=samples.buffers,
-        values={**samples.values, "way_low": tuple(low), "way_high": tuple(high), "spread": spread, "n": n, "m": m},
+        values={**samples.values, "begin": 0, "way_low": tuple(low), "way_high": tuple(high), "spread": spread,
+                "n": n, "m": m},
         settings={"n": n, "m": m},
         banded=False,
     )  # fmt: skip
