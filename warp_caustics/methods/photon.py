@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.scatter import make_scatter
-from ..program import Pass, Program, accumulator, strip_rows, wave_pass
+from ..kernels.scatter_waves import make_scatter_waves
+from ..program import Pass, Program, accumulator, strip_rows, wave_pass, wave_plane_pass
 from ..window import lattice_over
 
 if TYPE_CHECKING:
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
 
 STRIP_ROWS = 256
 """Rows of a strip: enough strips for every core, few enough launches."""
+
+
+def by_blocks(water: str, device: str) -> bool:
+    """Whether waves are added up for blocks of columns at once."""
+    return device == "cpu" and water == "waves"
 
 
 def photon(facts: Facts) -> Program:
@@ -31,11 +37,13 @@ def photon(facts: Facts) -> Program:
     lattice = lattice_over(low - spare, high + spare, facts.scene.map.resolution, step)
     spec = replace(spec, accumulate=accumulator(facts.scene, lattice))
     columns, rows = lattice.count[0], strip_rows(STRIP_ROWS, lattice, len(facts.suns))
-    waves = wave_pass(spec, lattice, facts.waves, rows, 0, 0.5)
-    scatter = Pass(
-        "scatter", "waves, refraction, landing, splat of each photon", lambda: make_scatter(spec),
-        lambda strip: (strip, columns),
-    )  # fmt: skip
+    does = "waves, refraction, landing, splat of each photon"
+    if by_blocks(spec.water, facts.device):
+        waves = wave_plane_pass(lattice, facts.waves, rows)
+        scatter = Pass("scatter_waves", does, lambda: make_scatter_waves(spec), lambda strip: (strip,))
+    else:
+        waves = wave_pass(spec, lattice, facts.waves, rows, 0, 0.5)
+        scatter = Pass("scatter", does, lambda: make_scatter(spec), lambda strip: (strip, columns))
     return Program(
         lattice=lattice,
         strip_rows=rows,
