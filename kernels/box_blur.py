@@ -40,6 +40,7 @@ def make_box_blur(row_step: int, column_step: int) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def box_blur(
         # In:
+        begin: int,
         image: wp.array2d[float],
         radius: int,
         # Out:
@@ -47,6 +48,7 @@ def make_box_blur(row_step: int, column_step: int) -> wp.Kernel:
     ):
         """One thread a texel; launch dims (rows, columns)."""
         row, column = wp.tid()
+        row += begin
         blurred_out[row, column] = box_mean(image, row, column, wp.static(row_step), wp.static(column_step), radius)
 
     return box_blur

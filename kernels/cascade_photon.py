@@ -205,6 +205,7 @@ def make_cascade_photons(spec: CascadeSpec) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def cascade_photons(
         # In:
+        begin: int,
         scene: Scene,
         suns: wp.array[SunSample],
         light_direction: wp.vec3,
@@ -230,6 +231,7 @@ def make_cascade_photons(spec: CascadeSpec) -> wp.Kernel:
         dispersed has one round, whose index is the first, and carries all channels.
         """
         row, column = wp.tid()
+        row += begin
         view = light_view[0]
         origin = water_position_at(view, water_position, column, row)
         if not wp.isfinite(origin):

@@ -53,6 +53,7 @@ def make_composite(accumulate: str, channels: int, colours: int, flux: bool) -> 
     @wp.kernel(module="unique", enable_backward=False)
     def composite(
         # In:
+        begin: int,
         light: wp.array[dtype],
         eye_view: wp.array[View],
         eye_depth: wp.array2d[float],
@@ -75,6 +76,7 @@ def make_composite(accumulate: str, channels: int, colours: int, flux: bool) -> 
         colour.
         """
         row, column = wp.tid()
+        row += begin
         depth = eye_depth[row, column]
         if not wp.isfinite(depth):
             return
@@ -110,6 +112,7 @@ def make_dry_picture(spec: Spec, colours: int) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def dry_picture(
         # In:
+        begin: int,
         scene: Scene,
         suns: wp.array[SunSample],
         eye_view: wp.array[View],
@@ -121,6 +124,7 @@ def make_dry_picture(spec: Spec, colours: int) -> wp.Kernel:
     ):
         """One thread a pixel; launch dims (rows, columns)."""
         row, column = wp.tid()
+        row += begin
         depth = eye_depth[row, column]
         if not wp.isfinite(depth):
             return

@@ -29,6 +29,7 @@ def dispersed_from(point: wp.vec3, normal: wp.vec3, way: wp.vec2) -> wp.vec3:
 @wp.kernel(enable_backward=False)
 def disperse(
     # In:
+    begin: int,
     picture: wp.array[float],
     eye_view: wp.array[View],
     eye_depth: wp.array2d[float],
@@ -44,6 +45,7 @@ def disperse(
     its own.
     """
     row, column = wp.tid()
+    row += begin
     rows = eye_depth.shape[0]
     columns = eye_depth.shape[1]
     pixel = row * columns + column

@@ -29,6 +29,7 @@ def pixel_ray(view: View, column: float, row: float) -> wp.vec3:
 @wp.kernel(enable_backward=False)
 def eye_surface(
     # In:
+    begin: int,
     eye_view: wp.array[View],
     eye_depth: wp.array2d[float],
     eye_normal: wp.array2d[wp.vec3],
@@ -44,6 +45,7 @@ def eye_surface(
     and in footprints of the pixel, which are added up.
     """
     row, column = wp.tid()
+    row += begin
     depth = eye_depth[row, column]
     normal = eye_normal[row, column]
     plane = wp.vec4(0.0, 0.0, 0.0, NOWHERE)

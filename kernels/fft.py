@@ -26,16 +26,19 @@ def fft_block(length: int, device: str) -> int:
 def make_fft_rows(length: int, inverse: bool = False) -> wp.Kernel:
     """Transform each row of ``length`` complex float64 in place.
 
-    Launch dim ``(rows, block)``, in blocks of :func:`fft_block`'s size.
+    Launch dim ``(rows, block)``, from row ``begin``, in blocks of :func:`fft_block`'s size.
     """
     assert SHORTEST <= length <= LONGEST and length & (length - 1) == 0
 
     @wp.kernel(enable_backward=False, module="unique", module_options={"enable_mathdx_fft": False})
     def fft_rows(
+        # In:
+        begin: int,
         # Out:
         rows_out: wp.array2d[wp.vec2d],
     ):
         row, _ = wp.tid()
+        row += begin
         values = wp.tile_load(rows_out, shape=(1, length), offset=(row, 0))
         if wp.static(inverse):
             wp.tile_ifft(values)

@@ -25,6 +25,7 @@ def make_filter(guided: bool, colours: int) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def filter_picture(
         # In:
+        begin: int,
         picture: wp.array[float],
         eye_view: wp.array[View],
         eye_depth: wp.array2d[float],
@@ -36,6 +37,7 @@ def make_filter(guided: bool, colours: int) -> wp.Kernel:
     ):
         """One thread a pixel; launch dims (rows, columns). ``radius`` in pixels; what sees nothing stays dark."""
         row, column = wp.tid()
+        row += begin
         rows = eye_depth.shape[0]
         columns = eye_depth.shape[1]
         total = float(0.0)

@@ -78,6 +78,7 @@ def resolve_kernel(spec: Resolve) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def resolve_g_buffer_kernel(
         # In:
+        begin: int,
         view: wp.array[View],
         visibility: wp.array2d[wp.uint64],
         triangles: wp.array[wp.vec3i],
@@ -94,6 +95,7 @@ def resolve_kernel(spec: Resolve) -> wp.Kernel:
         Launched over (rows, columns). Arrays that ``spec`` does not name are not touched and may be None.
         """
         row, column = wp.tid()
+        row += begin
         key = visibility[row, column]
         seen = key != wp.uint64(wp.static(EMPTY))
         id = key_triangle(key)

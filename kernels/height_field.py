@@ -64,12 +64,14 @@ def make_pressure(periodic: bool, obstacles: bool, capillary: bool) -> wp.Kernel
     @wp.kernel(enable_backward=False, module="unique")
     def pressure(
         # In:
+        begin: int,
         field: HeightField,
         height: wp.array2d[wp.float64],
         # Out:
         pressure_out: wp.array2d[wp.float64],
     ):
         row, column = wp.tid()
+        row += begin
         value = field.gravity * height[row, column]
         if wp.static(capillary):
             value -= field.tension * laplacian(field, height, row, column)
@@ -90,6 +92,7 @@ def make_leap(periodic: bool, obstacles: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def leap(
         # In:
+        begin: int,
         field: HeightField,
         pressure: wp.array2d[wp.float64],
         step: wp.float64,
@@ -99,6 +102,7 @@ def make_leap(periodic: bool, obstacles: bool) -> wp.Kernel:
         height_out: wp.array2d[wp.float64],
     ):
         row, column = wp.tid()
+        row += begin
         one = wp.float64(1.0)
         velocity = (one - drag) * velocity_out[row, column] + step * laplacian(field, pressure, row, column)
         velocity = velocity / (one + drag)
@@ -111,6 +115,7 @@ def make_leap(periodic: bool, obstacles: bool) -> wp.Kernel:
 @wp.kernel(enable_backward=False)
 def begin_solve(
     # In:
+    begin: int,
     height: wp.array2d[wp.float64],
     velocity: wp.array2d[wp.float64],
     ahead: wp.float64,
@@ -119,6 +124,7 @@ def begin_solve(
 ):
     """First guess of the mean of a step's two heights: its right-hand side ``h + ahead v``; one thread a cell."""
     row, column = wp.tid()
+    row += begin
     mean_out[row, column] = height[row, column] + ahead * velocity[row, column]
 
 
@@ -134,6 +140,7 @@ def make_solve(periodic: bool, obstacles: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def solve(
         # In:
+        begin: int,
         field: HeightField,
         height: wp.array2d[wp.float64],
         velocity: wp.array2d[wp.float64],
@@ -147,6 +154,7 @@ def make_solve(periodic: bool, obstacles: bool) -> wp.Kernel:
         mean_out: wp.array2d[wp.float64],
     ):
         row, column = wp.tid()
+        row += begin
         mean = mean_out[row, column]
         residual = height[row, column] + ahead * velocity[row, column] - mean
         residual += stiffness * laplacian(field, pressure, row, column)
@@ -160,6 +168,7 @@ def make_solve(periodic: bool, obstacles: bool) -> wp.Kernel:
 @wp.kernel(enable_backward=False)
 def end_solve(
     # In:
+    begin: int,
     mean: wp.array2d[wp.float64],
     per_half_step: wp.float64,
     # Out:
@@ -168,6 +177,7 @@ def end_solve(
 ):
     """Reflect the old state at the mean: ``h' = 2 mean - h``, ``v' = 4 (mean - h) / step - v``; one thread a cell."""
     row, column = wp.tid()
+    row += begin
     two = wp.float64(2.0)
     half = mean[row, column] - height_out[row, column]
     velocity_out[row, column] = two * per_half_step * half - velocity_out[row, column]
@@ -181,6 +191,7 @@ def make_drop(obstacles: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def drop(
         # In:
+        begin: int,
         field: HeightField,
         row_profiles: wp.array2d[wp.float64],
         column_profiles: wp.array2d[wp.float64],
@@ -189,6 +200,7 @@ def make_drop(obstacles: bool) -> wp.Kernel:
         height_out: wp.array2d[wp.float64],
     ):
         row, column = wp.tid()
+        row += begin
         rise = row_profiles[number, row] * column_profiles[number, column]
         if wp.static(obstacles):
             if field.solid[row, column] != wp.uint8(0):
@@ -209,6 +221,7 @@ def make_surface(periodic: bool, obstacles: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def surface(
         # In:
+        begin: int,
         field: HeightField,
         height: wp.array2d[wp.float64],
         velocity: wp.array2d[wp.float64],
@@ -217,6 +230,7 @@ def make_surface(periodic: bool, obstacles: bool) -> wp.Kernel:
         surface_out: wp.array2d[wp.float64],
     ):
         row, column = wp.tid()
+        row += begin
         value = height[row, column] - lag * velocity[row, column]
         if wp.static(obstacles):
             if field.solid[row, column] != wp.uint8(0):

@@ -39,6 +39,7 @@ def make_light_lattice(kind: str, ground: bool) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def light_lattice(
         # In:
+        begin: int,
         scene: Scene,
         light_view: wp.array[View],
         cell: int,
@@ -55,6 +56,7 @@ def make_light_lattice(kind: str, ground: bool) -> wp.Kernel:
         is the plane on which the corners lie on the texel grid.
         """
         row, column = wp.tid()
+        row += begin
         i = row * columns + column
         texel_column = float(column * cell - margin[0])
         texel_row = float(row * cell - margin[1])
@@ -80,6 +82,7 @@ def make_store_texel(positions: str, storage: str) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def store_texel(
         # In:
+        begin: int,
         light_view: wp.array[View],
         visibility: wp.array2d[wp.uint64],
         triangles: wp.array[wp.vec3i],
@@ -91,6 +94,7 @@ def make_store_texel(positions: str, storage: str) -> wp.Kernel:
     ):
         """One thread a texel; launch dim (rows, columns). Where nothing is seen, the position is infinite."""
         row, column = wp.tid()
+        row += begin
         key = visibility[row, column]
         seen = key != wp.uint64(wp.static(EMPTY))
         depth = wp.inf

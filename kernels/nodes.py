@@ -38,11 +38,13 @@ def make_nodes(periodic: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def nodes(
         # In:
+        begin: int,
         surface: wp.array2d[wp.float64],
         # Out:
         nodes_out: wp.array2d[wp.vec4],
     ):
         row, column = wp.tid()
+        row += begin
         j = row
         i = column
         if wp.static(not periodic):
@@ -96,12 +98,14 @@ def make_extremes(periodic: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def extremes(
         # In:
+        begin: int,
         nodes: wp.array2d[wp.vec4],
         per_metre: wp.vec2,
         # Out:
         extremes_out: wp.array[float],
     ):
         row, column = wp.tid()
+        row += begin
         right = wp.min(column + 1, nodes.shape[1] - 1)
         above = wp.min(row + 1, nodes.shape[0] - 1)
         if wp.static(periodic):

@@ -189,6 +189,7 @@ def make_pattern(spec: PatternSpec) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def project_pattern(
         # In:
+        begin: int,
         depth: wp.array2d[float],
         normal: wp.array2d[wp.vec3],
         lit: wp.array2d[float],
@@ -203,6 +204,7 @@ def make_pattern(spec: PatternSpec) -> wp.Kernel:
     ):
         """One thread a pixel; launch dims (rows, columns)."""
         row, column = wp.tid()
+        row += begin
         far = depth[row, column]
         result = wp.vec3(0.0, 0.0, 0.0)
         if wp.isfinite(far):

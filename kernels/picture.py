@@ -136,19 +136,19 @@ def make_picture(spec: PictureSpec) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def picture(
         # In:
+        begin: int,
         scene: Scene,
         view: wp.array[View],
         appearance: Appearance,
         light: wp.array2d[wp.vec3],
         surroundings: wp.array2d[wp.vec3],
-        first_row: int,
         side: int,
         # Out:
         picture_out: wp.array2d[wp.vec3],
     ):
-        """One thread a pixel; launch dims (rows from first_row, columns); ``side`` x ``side`` rays, their mean kept."""
+        """One thread a pixel, from row ``begin``; launch dims (rows, columns); the mean of ``side`` x ``side`` rays."""
         row, column = wp.tid()
-        row += first_row
+        row += begin
         total = wp.vec3(0.0, 0.0, 0.0)
         for j in range(side):
             for i in range(side):

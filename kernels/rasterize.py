@@ -193,13 +193,14 @@ def fill_polygon(
 @wp.kernel(enable_backward=False)
 def project_vertices_kernel(
     # In:
+    begin: int,
     view: wp.array[View],
     vertices: wp.array[wp.vec3],
     # Out:
     screen_out: wp.array[wp.vec3],
 ):
     """Project one vertex [m] to homogeneous pixels. Launched over the vertices."""
-    i = wp.tid()
+    i = wp.tid() + begin
     screen_out[i] = project(view[0], vertices[i])
 
 

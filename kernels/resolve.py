@@ -26,13 +26,14 @@ def make_resolve(accumulate: str, channels: int, colours: int) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def resolve(
         # In:
+        begin: int,
         lanes: wp.array2d[dtype],
         scale: wp.vec3d,
         # Out:
         map_out: wp.array[float],
     ):
-        """One thread a value of the map; launch dim pixels * colours."""
-        i = wp.tid()
+        """One thread a value of the map, from ``begin``; launch dim pixels * colours."""
+        i = wp.tid() + begin
         pixel = i // wp.static(colours)
         colour = i - pixel * wp.static(colours)
         at = pixel * wp.static(channels) + wp.where(wp.static(channels) == 1, 0, colour)
@@ -44,9 +45,33 @@ def make_resolve(accumulate: str, channels: int, colours: int) -> wp.Kernel:
     return resolve
 
 
+@functools.cache
+def make_add_lanes(accumulate: str) -> wp.Kernel:
+    """Add what other lanes have to an accumulator."""
+    dtype = ACCUMULATOR[accumulate]
+
+    @wp.kernel(module="unique", enable_backward=False)
+    def add_lanes(
+        # In:
+        begin: int,
+        others: wp.array2d[dtype],
+        # Out:
+        total_out: wp.array[dtype],
+    ):
+        """One thread a value, from ``begin``; launch dim the values of a lane."""
+        i = wp.tid() + begin
+        total = total_out[i]
+        for lane in range(others.shape[0]):
+            total += others[lane, i]
+        total_out[i] = total
+
+    return add_lanes
+
+
 @wp.kernel(enable_backward=False)
 def stack(
     # In:
+    begin: int,
     red: wp.array[float],
     green: wp.array[float],
     blue: wp.array[float],
@@ -56,9 +81,9 @@ def stack(
 ):
     """Join three maps into one in colour; each brings 1 value a pixel, or 3 of which its own channel's counts.
 
-    One thread a pixel.
+    One thread a pixel, from ``begin``.
     """
-    i = wp.tid()
+    i = wp.tid() + begin
     map_out[3 * i] = red[i * each]
     map_out[3 * i + 1] = green[i * each + each // 2]
     map_out[3 * i + 2] = blue[i * each + each - 1]
@@ -98,6 +123,7 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def dry_land(
         # In:
+        begin: int,
         scene: Scene,
         suns: wp.array[SunSample],
         pixel: wp.vec2,
@@ -108,8 +134,12 @@ def make_dry_land(spec: Spec) -> wp.Kernel:
         map_out: wp.array[float],
         dry_out: wp.array[wp.float64],
     ):
-        """One thread a pixel; launch dims (rows, columns); ``irradiance`` is that of one direction of the sun."""
+        """One thread a pixel, from row ``begin``; launch dims (rows, columns).
+
+        ``irradiance`` is that of one direction of the sun.
+        """
         row, column = wp.tid()
+        row += begin
         middle = wp.vec2((float(column) + 0.5) * pixel[0], (float(row) + 0.5) * pixel[1])
         # Most pixels are wholly wet or wholly dry by a margin; only the others are looked at in parts.
         share = dry_share(scene, middle, wp.static(SURE) * pixel)

@@ -84,6 +84,7 @@ def make_shadow(receiver_kind: str, marches: bool, objects: bool) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def shadow(
         # In:
+        begin: int,
         depth: wp.array2d[float],
         normal: wp.array2d[wp.vec3],
         view: wp.array[View],
@@ -94,6 +95,7 @@ def make_shadow(receiver_kind: str, marches: bool, objects: bool) -> wp.Kernel:
     ):
         """One thread a pixel; launch dims (rows, columns)."""
         row, column = wp.tid()
+        row += begin
         far = depth[row, column]
         lit = float(0.0)
         if wp.isfinite(far):

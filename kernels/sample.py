@@ -46,6 +46,7 @@ def make_heights(water: str) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def heights(
         # In:
+        begin: int,
         scene: Scene,
         cell: wp.vec2,
         # Out:
@@ -53,6 +54,7 @@ def make_heights(water: str) -> wp.Kernel:
     ):
         """One thread a vertex; launch dims (vertices, vertices). ``cell`` [m]; the first stands at the map's origin."""
         row, column = wp.tid()
+        row += begin
         z = water_at(scene.water.surface, float(column) * cell[0], float(row) * cell[1])
         height_out[row, column] = z[0]
 
@@ -79,6 +81,7 @@ def facet_normal(height: wp.array2d[float], cell: wp.vec2, x: float, y: float) -
 @wp.kernel(enable_backward=False)
 def face_normals(
     # In:
+    begin: int,
     height: wp.array2d[float],
     cell: wp.vec2,
     # Out:
@@ -86,6 +89,7 @@ def face_normals(
 ):
     """Render the mesh from above: the normal of the triangle at each texel's middle; launch dims (rows, columns)."""
     row, column = wp.tid()
+    row += begin
     x = (float(column) + 0.5) / float(normal_out.shape[1]) * float(height.shape[1] - 1)
     y = (float(row) + 0.5) / float(normal_out.shape[0]) * float(height.shape[0] - 1)
     normal_out[row, column] = facet_normal(height, cell, x, y)
@@ -157,19 +161,19 @@ def make_sample(image: bool) -> wp.Kernel:
     @wp.kernel(module="unique", enable_backward=False)
     def sample(
         # In:
+        begin: int,
         normal: wp.array2d[wp.vec3],
         environment: wp.array2d[float],
         sampling: Sampling,
-        first_row: int,
         # Out:
         caustic_out: wp.array2d[float],
     ):
-        """One thread a texel, from the first row of a band; launch dims (its rows, columns).
+        """One thread a texel, from row ``begin``; launch dims (rows, columns).
 
         The sum is limited to 0 to 1, as their texture does.
         """
-        band_row, column = wp.tid()
-        row = first_row + band_row
+        row, column = wp.tid()
+        row += begin
         rows = float(normal.shape[0])
         columns = float(normal.shape[1])
         total = float(0.0)
@@ -196,6 +200,7 @@ def make_sample(image: bool) -> wp.Kernel:
 @wp.kernel(enable_backward=False)
 def scale_to_irradiance(
     # In:
+    begin: int,
     caustic: wp.array2d[float],
     irradiance: wp.vec3,
     colours: int,
@@ -204,5 +209,6 @@ def scale_to_irradiance(
 ):
     """Multiply the intensity by an irradiance, by colour; launch dims (rows, columns)."""
     row, column = wp.tid()
+    row += begin
     for c in range(colours):
         caustic_map_out[(row * caustic.shape[1] + column) * colours + c] = caustic[row, column] * irradiance[c]

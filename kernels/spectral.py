@@ -47,21 +47,23 @@ def make_evolve(mirrored: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def evolve(
         # In:
+        begin: int,
         spectrum: wp.array2d[wp.vec2d],
         wavenumbers: wp.vec2d,
         dispersion: Dispersion,
-        time: wp.float64,
+        clock: wp.array[wp.float64],
         # Out:
         modes_out: wp.array2d[wp.vec2d],
     ):
         row, column = wp.tid()
+        row += begin
         value = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
         if column < spectrum.shape[1]:
             wavevector = wp.vec2d(
                 mode_number(column, spectrum.shape[1], wp.static(mirrored)) * wavenumbers[0],
                 mode_number(row, spectrum.shape[0], wp.static(mirrored)) * wavenumbers[1],
             )
-            value = wp.cos(angular_frequency(dispersion, wavevector) * time) * spectrum[row, column]
+            value = wp.cos(angular_frequency(dispersion, wavevector) * clock[0]) * spectrum[row, column]
         modes_out[row, column] = value
 
     return evolve
@@ -78,14 +80,16 @@ def make_travel(looped: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def travel(
         # In:
+        begin: int,
         spectrum: wp.array2d[wp.vec2d],
         wavenumbers: wp.vec2d,
         dispersion: Dispersion,
-        time: wp.float64,
+        clock: wp.array[wp.float64],
         # Out:
         modes_out: wp.array2d[wp.vec2d],
     ):
         row, column = wp.tid()
+        row += begin
         wavevector = wp.vec2d(
             mode_number(column, spectrum.shape[1], False) * wavenumbers[0],
             mode_number(row, spectrum.shape[0], False) * wavenumbers[1],
@@ -94,8 +98,8 @@ def make_travel(looped: bool) -> wp.Kernel:
         if wp.static(looped):
             turns = wp.max(wp.round(frequency / dispersion.unit), wp.float64(1.0))
             frequency = turns * dispersion.unit
-        c = wp.cos(frequency * time)
-        s = wp.sin(frequency * time)
+        c = wp.cos(frequency * clock[0])
+        s = wp.sin(frequency * clock[0])
         mode = spectrum[row, column]
         modes_out[row, column] = wp.vec2d(mode[0] * c + mode[1] * s, mode[1] * c - mode[0] * s)
 
@@ -112,11 +116,13 @@ def make_turn(mirrored: bool) -> wp.Kernel:
     @wp.kernel(enable_backward=False, module="unique")
     def turn(
         # In:
+        begin: int,
         modes: wp.array2d[wp.vec2d],
         # Out:
         turned_out: wp.array2d[wp.vec2d],
     ):
         column, row = wp.tid()
+        column += begin
         if wp.static(mirrored):
             value = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
             if row < modes.shape[0]:
@@ -132,10 +138,12 @@ def make_turn(mirrored: bool) -> wp.Kernel:
 @wp.kernel(enable_backward=False)
 def spectral_surface(
     # In:
+    begin: int,
     turned: wp.array2d[wp.vec2d],
     # Out:
     height_out: wp.array2d[wp.float64],
 ):
     """Height of the water at the nodes [m], the real part of its sum; one thread a node."""
     row, column = wp.tid()
+    row += begin
     height_out[row, column] = turned[column, row][0]

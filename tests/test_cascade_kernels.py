@@ -48,7 +48,7 @@ def floor_seen(device, eye=EYE, tolerance=(0.0, 2.0)):
     wp.launch(
         eye_surface,
         dim=(ROWS, COLUMNS),
-        inputs=[arrays["view"], arrays["depth"], arrays["normal"], wp.vec2(*tolerance)],
+        inputs=[0, arrays["view"], arrays["depth"], arrays["normal"], wp.vec2(*tolerance)],
         outputs=[arrays["plane"], arrays["area"]],
         device=device,
     )
@@ -205,7 +205,7 @@ def composed(device, depth, parts, flux=True, light=1.0):
         views = [wp.clone(view_array(view), device=device) for view in (eye, sun)]
         wp.launch(
             make_composite("float32", 1, 3, flux), dim=(rows, columns),
-            inputs=[lights, views[0], given, area, views[1], wp.vec2(*reach), wp.vec4(*need), side, zone,
+            inputs=[0, lights, views[0], given, area, views[1], wp.vec2(*reach), wp.vec4(*need), side, zone,
                     wp.vec3d(*scale)],
             outputs=[left, picture], device=device,
         )  # fmt: skip
@@ -295,7 +295,7 @@ def test_a_normal_gives_its_slope(device):
 
 def filtered(device, guided, picture, depth, normal, arrays, radius=2):
     out = wp.empty(ROWS * COLUMNS, dtype=float, device=device)
-    inputs = [wp.array(picture.ravel().astype(np.float32), dtype=float, device=device), arrays["view"],
+    inputs = [0, wp.array(picture.ravel().astype(np.float32), dtype=float, device=device), arrays["view"],
               wp.array(depth.astype(np.float32), dtype=float, device=device),
               points(normal.reshape(-1, 3), device).reshape((ROWS, COLUMNS)), arrays["plane"], radius]  # fmt: skip
     wp.launch(make_filter(guided, 1), dim=(ROWS, COLUMNS), inputs=inputs, outputs=[out], device=device)
@@ -346,7 +346,7 @@ def test_channels_move_by_the_difference_of_their_ways(device):
     ways = np.array([[0.05, -0.02], [0.0, 0.0], [-0.04, 0.03]])
     out = wp.empty(ROWS * COLUMNS * 3, dtype=float, device=device)
     wp.launch(disperse, dim=(ROWS, COLUMNS), inputs=[
-        wp.array(picture.ravel().astype(np.float32), dtype=float, device=device), arrays["view"], arrays["depth"],
+        0, wp.array(picture.ravel().astype(np.float32), dtype=float, device=device), arrays["view"], arrays["depth"],
         arrays["normal"], arrays["plane"], points(ways, device)], outputs=[out], device=device)  # fmt: skip
     moved = out.numpy().reshape(ROWS, COLUMNS, 3)
     shift = FLOOR * (ways[:, 0] + 10.0 * ways[:, 1])

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import warp_caustics as wc
-from warp_caustics.cli import main
+from warp_caustics.cli import main, report
 from warp_caustics.cli.interrupt import Interrupt
 
 SCENE = """
@@ -208,7 +208,6 @@ BAD_COMMANDS = {
     "frames that are infinitely fast": (["render", "pool", "--frames", "2", "--fps", "nan"], "--fps"),
     "a picture of another format": (["render", "pool", "--picture", "-o", "frame.jpg"], ".png"),
     "two kinds of view": (["view", "pool", "--compare", "--method", "beam"], "--compare"),
-    "a profile": (["render", "pool", "--profile"], "not yet"),
     "a method that is none": (["render", "pool", "--method", "beem"], "beam"),
     "a device that is none": (["render", "pool", "--device", "gpu"], "cpu"),
     "an absent CUDA device": (["render", "pool", "--device", "cuda:99"], "cpu"),
@@ -316,6 +315,24 @@ def test_bad_input_in_a_process_of_its_own(folder):
     assert done.stdout == ""
     assert done.stderr.startswith("error: nosuch.toml")
     assert files(folder) == set()
+
+
+@pytest.mark.parametrize(("longest", "told"), [(0, True), (2**40, False)])
+def test_a_long_frame_tells_how_far_it_is(scene, folder, monkeypatch, longest, told):
+    shares: list[float] = []
+    monkeypatch.setattr("warp_caustics.plan.LONG_WORK", longest)
+    monkeypatch.setattr("warp_caustics.cli.report.share", lambda: contextlib.nullcontext(shares.append))
+    assert main(["render", str(scene), "--device", "cpu"]) == 0
+    assert shares[-1:] == ([1.0] if told else [])
+
+
+def test_a_bar_is_for_terminals(monkeypatch):
+    with report.share() as tell:
+        assert tell is None
+    monkeypatch.setenv("FORCE_COLOR", "1")  # what makes rich take a pipe for a terminal
+    with report.share() as tell:
+        assert tell is not None
+        tell(0.5)
 
 
 # --- failure and interruption ----------------------------------------------------------------------------------------

@@ -111,7 +111,7 @@ def sampled(normals, device, environment=None, first_row=0, **changed):
     if environment is not None:
         image = wp.array(environment.astype(np.float32), device=device)
     caustic = wp.zeros(normals.shape[:2], dtype=float, device=device)
-    inputs = [points(normals, device), image, sampling, first_row]
+    inputs = [first_row, points(normals, device), image, sampling]
     dim = (normals.shape[0] - first_row, normals.shape[1])
     wp.launch(make_sample(environment is not None), dim, inputs, [caustic], device=device)
     return caustic.numpy()
@@ -133,7 +133,7 @@ def test_vertices_stand_at_the_waters_height(device):
     scene = Scene()
     scene.water.surface = wave_surface([(0.1, (2.0, -1.0), 0.4), (0.05, (-3.0, 5.0), 2.0)], device)
     height = wp.zeros((9, 9), dtype=float, device=device)
-    wp.launch(make_heights("waves"), (9, 9), [scene, wp.vec2(0.25, 0.125)], [height], device=device)
+    wp.launch(make_heights("waves"), (9, 9), [0, scene, wp.vec2(0.25, 0.125)], [height], device=device)
     y, x = np.mgrid[:9, :9] * np.array([0.125, 0.25])[:, None, None]
     expected = 0.1 * np.sin(2.0 * x - y + 0.4) + 0.05 * np.sin(-3.0 * x + 5.0 * y + 2.0)
     np.testing.assert_allclose(height.numpy(), expected, atol=FLOAT32)
@@ -146,7 +146,7 @@ def test_normals_of_the_faces(device):
     normals = wp.zeros((ROWS, COLUMNS + 3), dtype=wp.vec3, device=device)
     cell = wp.vec2(size[0] / 7, size[1] / 7)
     wp.launch(
-        face_normals, normals.shape, [wp.array(height, dtype=float, device=device), cell], [normals], device=device
+        face_normals, normals.shape, [0, wp.array(height, dtype=float, device=device), cell], [normals], device=device
     )
     np.testing.assert_allclose(
         y_up(normals.numpy()), published_normals(height, size, ROWS, COLUMNS + 3), atol=10 * FLOAT32
@@ -210,8 +210,8 @@ def test_box_blur(device, radius):
     window = 2 * radius + 1
     expected = np.lib.stride_tricks.sliding_window_view(padded, (window, window)).mean(axis=(2, 3))
     buffers = [wp.array(image, dtype=float, device=device), wp.zeros(image.shape, dtype=float, device=device)]
-    wp.launch(make_box_blur(0, 1), image.shape, [buffers[0], radius], [buffers[1]], device=device)
-    wp.launch(make_box_blur(1, 0), image.shape, [buffers[1], radius], [buffers[0]], device=device)
+    wp.launch(make_box_blur(0, 1), image.shape, [0, buffers[0], radius], [buffers[1]], device=device)
+    wp.launch(make_box_blur(1, 0), image.shape, [0, buffers[1], radius], [buffers[0]], device=device)
     blurred = buffers[0].numpy()
     np.testing.assert_allclose(blurred, expected, atol=FLOAT32)
     assert blurred.mean(dtype=np.float64) == pytest.approx(image.mean(), abs=FLOAT32)
@@ -222,7 +222,7 @@ def test_box_blur(device, radius):
 def test_irradiance_by_colour(device, colours):
     intensity = rounded(np.random.default_rng(7).uniform(size=(ROWS, COLUMNS)))
     made = wp.zeros(ROWS * COLUMNS * colours, dtype=float, device=device)
-    inputs = [wp.array(intensity, dtype=float, device=device), wp.vec3(2.0, 3.0, 5.0), colours]
+    inputs = [0, wp.array(intensity, dtype=float, device=device), wp.vec3(2.0, 3.0, 5.0), colours]
     wp.launch(scale_to_irradiance, (ROWS, COLUMNS), inputs, [made], device=device)
     expected = intensity[..., None] * np.array([2.0, 3.0, 5.0])[:colours]
     np.testing.assert_allclose(made.numpy().reshape(expected.shape), expected, rtol=FLOAT32)

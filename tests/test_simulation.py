@@ -343,7 +343,6 @@ def test_an_interrupted_step_leaves_nothing_behind(device, kind, monkeypatch):
     def interrupted() -> None:
         left[0] -= 1
         if not left[0]:
-            water.motion._push.launch()
             for name in names:
                 getattr(water.motion, name).fill_(np.nan)
             raise KeyboardInterrupt

@@ -54,7 +54,8 @@ def test_rows_are_transformed_as_numpy_does(device, length, inverse):
     values = np.random.default_rng(length).normal(size=(3, length, 2))
     rows = wp.array(values, dtype=wp.vec2d, device=device)
     block = fft_block(length, device)
-    wp.launch(make_fft_rows(length, inverse), dim=(3, block), outputs=[rows], block_dim=block, device=device)
+    kernel = make_fft_rows(length, inverse)
+    wp.launch(kernel, dim=(3, block), inputs=[0], outputs=[rows], block_dim=block, device=device)
     complex_values = values[..., 0] + 1j * values[..., 1]
     expected = np.fft.ifft(complex_values) * length if inverse else np.fft.fft(complex_values)
     found = rows.numpy()[..., 0] + 1j * rows.numpy()[..., 1]
@@ -91,7 +92,7 @@ def test_nodes_are_those_of_the_host(device, periodic, shape):
     shape = (shape[0] + 2 * ring, shape[1] + 2 * ring)
     nodes = wp.zeros(shape, dtype=wp.vec4, device=device)
     surface = wp.array(z, dtype=wp.float64, device=device)
-    wp.launch(make_nodes(periodic), dim=shape, inputs=[surface], outputs=[nodes], device=device)
+    wp.launch(make_nodes(periodic), dim=shape, inputs=[0, surface], outputs=[nodes], device=device)
     expected = hermite_nodes(np.pad(z, 4, mode="wrap" if periodic else "symmetric"))[beyond:-beyond, beyond:-beyond]
     np.testing.assert_allclose(nodes.numpy(), expected, rtol=0.0, atol=NODE_TOLERANCE * np.abs(expected).max())
 
@@ -113,7 +114,7 @@ def test_extremes_are_those_of_the_surface(device, periodic, seed):
     nodes = points(hermite_nodes(padded)[border:-border, border:-border], device)
     extremes = wp.zeros(2, dtype=float, device=device)
     per_metre = wp.vec2(1.0 / cell[0], 1.0 / cell[1])
-    wp.launch(make_extremes(periodic), dim=z.shape, inputs=[nodes, per_metre], outputs=[extremes], device=device)
+    wp.launch(make_extremes(periodic), dim=z.shape, inputs=[0, nodes, per_metre], outputs=[extremes], device=device)
     expected = [np.hypot(along, across).max(), np.abs(sample_heights(grid, x, y)).max()]
     np.testing.assert_allclose(extremes.numpy(), expected, rtol=VALUE_TOLERANCE)
 

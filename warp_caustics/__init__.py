@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from warp_caustics.comparison import Comparison, compare
     from warp_caustics.exr import load_map
     from warp_caustics.plan import Plan, make_plan
+    from warp_caustics.profiling import Profile, profile
     from warp_caustics.reference import Reference, make_reference
     from warp_caustics.renderer import Renderer, render
     from warp_caustics.result import Result
@@ -27,6 +28,7 @@ __all__ = [
     "Comparison",
     "InputError",
     "Plan",
+    "Profile",
     "Reference",
     "RenderError",
     "Renderer",
@@ -42,6 +44,7 @@ __all__ = [
     "make_plan",
     "make_reference",
     "make_texture",
+    "profile",
     "render",
 ]
 
@@ -49,6 +52,7 @@ __all__ = [
 _HOMES = {
     "Comparison": "comparison",
     "Plan": "plan",
+    "Profile": "profiling",
     "Reference": "reference",
     "Renderer": "renderer",
     "Result": "result",
@@ -61,6 +65,7 @@ _HOMES = {
     "make_plan": "plan",
     "make_reference": "reference",
     "make_texture": "texture",
+    "profile": "profiling",
     "render": "renderer",
 }
 

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 MOST_VALUES = 2**31 - 1
 """Values of one array at most, in Warp."""
 
+MOST_STRIDE = 2**31 - 1
+"""Bytes of a row of an array of several dimensions at most: Warp's kernels step from one to the next by an int32."""
+
 SPARE_MEMORY = 0.9
 """Share of the free memory that a plan may take."""
 
@@ -60,6 +63,11 @@ def check_map_fits(scene: Scene, device: str, free: int) -> None:
             f"map.resolution: {columns} x {rows} pixels take at least {least:,} bytes, and {device} has {free:,} free; "
             "expected a map that fits in memory"
         )
+
+
+def steps_too_far(plan: Plan) -> bool:
+    """Tell whether a lane's copy of a buffer is so large that no kernel can step on to the next lane's."""
+    return any(plan.copies(buffer) > 1 and buffer.bytes > MOST_STRIDE for buffer in plan.buffers)
 
 
 def check_work(facts: Facts, program: Program | Sequence) -> None:

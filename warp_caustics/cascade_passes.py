@@ -118,7 +118,7 @@ def cascade_passes(layout: Layout, number: int, cascade: Cascade) -> Passes:
     rows, columns = layout.picture
     light = Buffer(
         f"{prefix}.light", ACCUMULATOR_DTYPE[layout.spec.scene.accumulate], (rows * columns * layout.channels,),
-        ACCUMULATOR_BYTES[layout.spec.scene.accumulate],
+        ACCUMULATOR_BYTES[layout.spec.scene.accumulate], per_lane=True,
     )  # fmt: skip
     uploads: dict[str, Callable[[str], Any]] = {}
     for part in parts:
@@ -206,7 +206,7 @@ def _photons(layout: Layout, prefix: str, booked: bool) -> Lane:
         *fills,
         *(
             Step("photons", "refraction, landing, splat of each texel's photon", lambda: make_cascade_photons(spec),
-                 layout.texels, {**bind, "first_channel": first, "last_channel": last})
+                 layout.texels, {**bind, "first_channel": first, "last_channel": last}, ("light", "ledger"))
             for first, last in ranges
         ),
     )  # fmt: skip

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import warp as wp
 
+from .bands import bind_lanes
 from .dispersion import CHANNELS, DispersedPlan, stacked_energy
 from .kernels.resolve import stack
 from .lattice_recording import LatticeRecording
-from .recording import Stages, bind, shaped
+from .recording import Stages, shaped
 
 if TYPE_CHECKING:
     from .energy import Energy
@@ -34,7 +35,7 @@ class DispersedRecording:
         values = {**dict(zip(CHANNELS, maps, strict=True)), "each": maps[0].size // (columns * rows), "map": flat}
         stages = zip(*(channel.stages for channel in channels), strict=True)
         self.stages: Stages = [[lane for lanes in stage for lane in lanes] for stage in stages]
-        self.stages.append([[bind(stack, (columns * rows,), values, plan.device)]])
+        self.stages.append(bind_lanes(stack, (columns * rows,), values, plan.device, plan.threads))
 
     def energy(self) -> Energy:
         """Read back the ledgers of the channels."""

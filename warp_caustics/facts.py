@@ -30,6 +30,7 @@ SPARE_WAY = 4.0
 class Facts:
     """All that a plan needs to know of a scene; ``basin`` is water that is made before each frame.
 
+    ``device`` is where the frame is made: forms of a sum that are the fastest on one are not on the other.
     Heights are relative to the water's level, positions to the map's origin, in metres and float64.
     """
 
@@ -53,6 +54,7 @@ class Facts:
     reasons: tuple[Reason, ...]
     basin: Basin | Sea | None = None
     warnings: tuple[str, ...] = field(default=())
+    device: str = "cpu"
 
     @property
     def sun_share(self) -> float:

@@ -153,6 +153,7 @@ def rasterize_into(g_buffer: GBuffer, triangles: Triangles, scratch: Scratch, no
         resolve_kernel(spec),
         dim=scratch.visibility.shape,
         inputs=[
+            0,
             scratch.view,
             scratch.visibility,
             triangles.triangles,
@@ -174,7 +175,7 @@ def _fill(triangles: Triangles, scratch: Scratch) -> None:
     wp.launch(
         project_vertices_kernel,
         dim=scratch.screen.size,
-        inputs=[scratch.view, triangles.vertices],
+        inputs=[0, scratch.view, triangles.vertices],
         outputs=[scratch.screen],
         device=device,
     )

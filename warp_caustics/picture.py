@@ -10,19 +10,21 @@ from __future__ import annotations
 
 import math
 import os
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
 
+from .bands import bind_lanes
+from .crew import Crew
 from .errors import InputError
 from .eye import eye_view, view_array
 from .facts import gather_facts
 from .kernels.picture import make_picture
 from .kernels.shade import Appearance, PictureSpec
 from .kernels.spec import Spec
+from .recording import launches
 from .state import SceneState
 from .surroundings import make_surroundings
 from .tone import decode_srgb
@@ -81,11 +83,11 @@ class Painter:
         if scene.camera is None:
             raise InputError("camera: missing, and a picture needs one; expected a table [camera]")
         self.facts = gather_facts(scene, result.assets)
-        self._device, self._threads = result.device, result.plan.threads
+        self._device, self._crew = result.device, Crew(result.plan.threads)
         self._straight = result.caustic_map is None
         self._published = result.method in PUBLISHED
         self._around = None if self._published else make_surroundings(result)
-        self._state = SceneState(self.facts, self._device)
+        self._state = SceneState(self.facts, self._device, self._crew)
         self._view = wp.clone(view_array(eye_view(scene.camera).projection(_origin(scene))), device=self._device)
         self._look = self._appearance(scene, scene.camera)
 
@@ -99,16 +101,11 @@ class Painter:
         kernel = make_picture(self._spec())
         nothing = wp.empty((0, 0), dtype=wp.vec3, device=self._device)
         around = nothing if self._around is None else self._upload(self._around.light(result.time))
-        inputs = [self._state.scene, self._view, self._look, self._upload(result.image), around]
-
-        def launch(first: int, last: int) -> None:
-            dim = (last - first, columns)
-            wp.launch(kernel, dim=dim, inputs=[*inputs, first, RAYS], outputs=[picture], device=self._device)
-
-        launch(0, 1)  # compiles, which threads must not do side by side
-        ends = [1 + (rows - 1) * part // self._threads for part in range(self._threads + 1)]
-        with ThreadPoolExecutor(self._threads) as pool:
-            list(pool.map(launch, ends[:-1], ends[1:]))
+        values = {
+            "scene": self._state.scene, "view": self._view, "appearance": self._look,
+            "light": self._upload(result.image), "surroundings": around, "side": RAYS, "picture": picture,
+        }  # fmt: skip
+        self._crew.run(launches(bind_lanes(kernel, picture.shape, values, self._device, self._crew.threads)))
         made = np.asarray(picture.numpy())
         return decode_srgb(np.clip(made, 0.0, 1.0)).astype(np.float32) if self._published else made
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from .assets import load_assets
-from .capacity import SPARE_MEMORY, check_map_fits, check_work, too_large
+from .capacity import SPARE_MEMORY, check_map_fits, check_work, steps_too_far, too_large
 from .dispersion import CHANNELS, DispersedPlan, channel_scene
 from .errors import InputError
 from .facts import Facts, gather_facts, with_placed_water
@@ -42,7 +42,7 @@ class Plan:
     method, device : str
         By name.
     threads : int
-        Lanes that strips are spread over; 1 on a GPU.
+        That a frame is spread over; 1 on a GPU.
     facts : Facts
         What follows from the scene.
     program : Program or Sequence
@@ -106,7 +106,7 @@ class Plan:
 
     def copies(self, buffer: Buffer) -> int:
         """Count how often a buffer is allocated."""
-        return self.threads if buffer.per_lane else 1
+        return self.program.copies(self.threads) if buffer.per_lane else 1
 
     def __str__(self) -> str:
         """Return the plan as text: kept, left out, why, bytes."""
@@ -221,13 +221,23 @@ def _plan_by_channel(facts: Facts, name: str, room: Room) -> DispersedPlan:
 
 
 def _plan(facts: Facts, name: str, room: Room) -> Plan:
+    facts = replace(facts, device=room.device)
     program = METHODS[name](facts)
     if isinstance(program, Sequence) and not program.follows_water:
         facts = replace(facts, basin=None)
     check_work(facts, program)
+    if isinstance(program, Program):
+        program = program.spread(room.threads, len(facts.suns))
     lanes = min(room.threads, program.lanes(facts))
     plan = Plan(name, room.device, lanes, facts, program, _buffers(facts, program))
-    if plan.bytes > SPARE_MEMORY * room.free and room.fewer:
+    too_far = steps_too_far(plan)
+    if too_far and not room.fewer:
+        columns, rows = facts.scene.map.resolution
+        raise InputError(
+            f"threads: {lanes} of them have a map of {columns} x {rows} pixels each, of more bytes than a kernel can "
+            "step over; expected 1, or a smaller map"
+        )
+    if too_far or (plan.bytes > SPARE_MEMORY * room.free and room.fewer):
         # Each thread has a map of its own; with fewer there may be room.
         plan = replace(plan, threads=1)
     if plan.bytes > SPARE_MEMORY * room.free:

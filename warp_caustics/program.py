@@ -8,11 +8,13 @@ a program has are not allocated.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from .kernels.lanes import padded
 from .kernels.ledger import BINS, ENTRIES
 from .kernels.place_table import place_table
+from .kernels.wave_rows import wave_planes
 from .kernels.wave_table import wave_table
 
 if TYPE_CHECKING:
@@ -27,6 +29,13 @@ MOST_WORK = 2**33
 
 MOST_JOBS = 4096
 """Strips times directions of the sun at most: each is recorded, at 4 KB and a tenth of a millisecond a launch."""
+
+
+MANY_STRIPS = 8
+"""Strips for each thread past which one more or less makes little difference."""
+
+LEAST_STRIP = 16
+"""Rows of a strip that is made smaller than its method asks for: a strip has rows of corners beside it."""
 
 
 ACCUMULATOR_BYTES = {"float32": 4, "float64": 8, "fixed": 8}
@@ -83,13 +92,19 @@ class Pass:
     kernel : callable
         Builds the kernel; called when a renderer compiles, not when a plan is made.
     dim : callable
-        Rows of the strip to launch dimensions.
+        Rows of the strip to launch dimensions, or to the items of a pass that walks.
+    weight : int
+        Values that each thread goes through, as a row of a picture.
+    walks : bool
+        Whether a thread walks over a block of items: all of a strip on a CPU, one on a GPU.
     """
 
     name: str
     does: str
     kernel: Callable[[], Any]
     dim: Callable[[int], tuple[int, ...]]
+    weight: int = 1
+    walks: bool = False
 
 
 def wave_pass(spec: Spec, lattice: Lattice, waves: int, rows: int, border: int, offset: float) -> WavePass:
@@ -125,6 +140,21 @@ def wave_pass(spec: Spec, lattice: Lattice, waves: int, rows: int, border: int, 
     )  # fmt: skip
 
 
+def wave_plane_pass(lattice: Lattice, waves: int, rows: int, border: int = 0, offset: float = 0.5) -> WavePass:
+    """Plan the tables of a lattice's waves, laid out for whole rows of columns; parameters as :func:`wave_pass`."""
+    columns = padded(lattice.count[0] + border)
+    tables = Pass(
+        "wave_planes", "sines of each row and column of points", lambda: wave_planes,
+        lambda strip: (max(columns, strip + border),),
+    )  # fmt: skip
+    buffers = (
+        Buffer("column_cos", "float32", (waves, columns), 4, per_lane=True),
+        Buffer("column_sin", "float32", (waves, columns), 4, per_lane=True),
+        Buffer("row_waves", "vec2", (rows + border, waves), 8, per_lane=True),
+    )
+    return WavePass((tables,), buffers, {"offset": offset})
+
+
 @dataclass(frozen=True)
 class WavePass:
     """The pass, buffers and values of :func:`wave_pass`, to be joined to a program's own."""
@@ -155,7 +185,10 @@ class Program:
     settings : mapping
         The method's parameters as chosen, for people to read.
     banded : bool
-        Whether strips may run side by side, each thread adding to a map of its own.
+        Whether strips may run side by side, each thread adding to a map of its own. If not, there is one strip, and
+        each pass whose kernel has the parameter ``begin`` is spread over threads by itself.
+    steps : bool
+        Whether the map is summed up from steps along its rows (:mod:`.kernels.edges`), in float64.
     conserves : bool
         Whether the map holds the light that arrives in it, so that its sum is what was received. Else the ledger counts
         that apart, and what the map holds beyond it was invented.
@@ -169,6 +202,7 @@ class Program:
     accumulate: str = "float32"
     settings: Mapping[str, Any] = field(default_factory=dict)
     banded: bool = True
+    steps: bool = False
     conserves: bool = True
 
     @property
@@ -196,8 +230,22 @@ class Program:
         return sum(count for _, count, _ in self.pass_lines(facts))
 
     def lanes(self, facts: Facts) -> int:
-        """Threads that can work side by side."""
-        return self.strips * len(facts.suns) if self.banded else 1
+        """Threads that can work side by side: on strips, or on rows of a pass."""
+        return self.strips * len(facts.suns) if self.banded else self.lattice.count[1]
+
+    def copies(self, threads: int) -> int:
+        """Count the buffers that are one for each lane."""
+        return threads
+
+    def spread(self, threads: int, suns: int) -> Program:
+        """Cut the strips so that each thread gets as many as the others, if there are so few that it matters."""
+        if not self.banded or self.strips * suns > MANY_STRIPS * threads:
+            return self
+        strips = self.strips
+        while strips * suns % threads:
+            strips += 1
+        rows = -(-self.lattice.count[1] // strips)
+        return replace(self, strip_rows=rows) if rows >= LEAST_STRIP else self
 
     def kernels(self, facts: Facts) -> tuple[str, ...]:
         """Names of the kernels that are compiled."""
@@ -207,14 +255,20 @@ class Program:
         """Buffers of the method, its map and its ledger."""
         columns, rows = facts.scene.map.resolution
         channels = facts.spec.channels
-        dry = (Buffer("dry", "float64", (3,), 8),) if facts.spec.shore else ()
+        dry = (Buffer("dry", "float64", (3,), 8, per_lane=True),) if facts.spec.shore else ()
+        own = self.buffers if self.banded else (replace(buffer, per_lane=False) for buffer in self.buffers)
         return (
             Buffer("caustic_map", "float32", (columns * rows * len(facts.irradiance),), 4),
-            Buffer("map", self.accumulate, (columns * rows * channels,), ACCUMULATOR_BYTES[self.accumulate], True),
+            self._accumulator(columns, rows, channels),
             Buffer("ledger", "float64", (len(ENTRIES) * channels, BINS), 8, per_lane=True),
-            *self.buffers,
+            *own,
             *dry,
-        )
+        )  # fmt: skip
+
+    def _accumulator(self, columns: int, rows: int, channels: int) -> Buffer:
+        """What a lane adds light to: pixels, or steps, which have a column and a row more and another after them."""
+        values = (columns + 1) * (rows + 1) + 1 if self.steps else columns * rows
+        return Buffer("map", self.accumulate, (values * channels,), ACCUMULATOR_BYTES[self.accumulate], self.banded)
 
     def work(self, facts: Facts) -> int:
         """Cells in a frame, all directions of the sun together."""

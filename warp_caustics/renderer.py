@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import functools
 import os
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from threading import RLock
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
 
+from .crew import Crew
 from .dispersed_recording import DispersedRecording
 from .dispersion import DispersedPlan
 from .errors import InputError
 from .lattice_recording import LatticeRecording
 from .plan import Plan, make_plan
+from .playback import Playback
 from .program import Program
-from .recording import Command, Recording
+from .recording import CopyCommand, Recording, Stages
 from .result import Result
 from .scene import Scene, load_scene
 from .sequence import Sequence
@@ -27,6 +29,8 @@ from .state import SceneState
 from .water import check_time
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .reference.renderer import ReferenceRenderer
     from .scene import Camera
 
@@ -63,8 +67,12 @@ class Renderer:
     ----------
     plan : Plan
         What it does, and what it leaves out.
+    stages : Stages
+        All that a frame launches: lanes of commands, stage by stage; what a simulation does to reach a time apart.
+    playback : Playback
+        What runs them, as graphs.
     compile_seconds : float
-        Time that building and loading the kernels took.
+        Time that building and loading the kernels, and recording the launches, took.
 
     Raises
     ------
@@ -85,18 +93,37 @@ class Renderer:
         self.plan: Plan | DispersedPlan = plan
         self._states: list[SceneState] = []
         self._camera: Camera | None = None  # where it was moved to
-        # Pinned on the host, so that the copy can be part of a captured frame.
-        self._host_clock = wp.zeros(1, dtype=wp.float64, device="cpu", pinned=plan.device != "cpu")
-        self._clock = wp.zeros(1, dtype=wp.float64, device=plan.device)
+        self._crew = Crew(plan.threads)
+        # Frames share all arrays: of two at once, each would change under the other's feet what it has checked.
+        self._rendering = RLock()
+        # Pinned on the host, so that the copy can be part of a graph; on a CPU it is the device's own.
+        pinned = plan.device != "cpu"
+        host_clock = wp.zeros(1, dtype=wp.float64, device="cpu", pinned=pinned)
+        self._host_time = host_clock.numpy()
+        self._clock = wp.zeros(1, dtype=wp.float64, device=plan.device) if pinned else host_clock
+        # After it the frame has read all that the host wrote for it.
+        self._done = wp.Event(plan.device) if pinned else None
         start = perf_counter()
         self._recording = self._record()
+        uploads: Stages = [[[CopyCommand(self._clock, host_clock)]]] if pinned else []
+        self.stages: Stages = [
+            *uploads, *(stage for state in self._states for stage in state.stages), *self._recording.stages,
+        ]  # fmt: skip
+        self.playback = Playback(self.stages, plan.device, self._crew)
         self.compile_seconds = perf_counter() - start
-        self._pool = ThreadPoolExecutor(self.plan.threads) if self.plan.threads > 1 else None
         self._time: float | None = None
+        self._asked = 0.0
         self._seconds = 0.0
 
-    def render(self, time: float = 0.0) -> Frame:
+    def render(self, time: float = 0.0, progress: Callable[[float], None] | None = None) -> Frame:
         """Render the frame at a time [s]: no allocation, no read-back.
+
+        Parameters
+        ----------
+        time : float
+            [s].
+        progress : callable, optional
+            Called on this thread, now and then, with the share of the frame that is done.
 
         Returns
         -------
@@ -109,21 +136,25 @@ class Renderer:
             If the time is not finite, so late that the waves' phases are not known, or one that the water's
             simulation does not reach.
         """
-        check_time(time)
-        start = perf_counter()
-        for state in self._states:
-            state.write(time)
-        self._host_clock.numpy()[0] = time
-        wp.copy(self._clock, self._host_clock)
-        for stage in self._recording.stages:
-            if self._pool is None or len(stage) == 1:
-                for lane in stage:
-                    _run(lane)
-            else:
-                # list() waits for every lane, and passes on what went wrong in one.
-                list(self._pool.map(_run, stage))
-        self._time, self._seconds = time, perf_counter() - start
+        with self._rendering:
+            self.write(time)
+            self._asked, self._time = time, None  # a frame that is interrupted is none
+            start = perf_counter()
+            self.playback.run(progress)
+            device = wp.get_device(self.plan.device)
+            if self._done is not None and not device.is_capturing:
+                device.stream.record_event(self._done)
+            self._time, self._seconds = time, perf_counter() - start
         return Frame(self._recording.caustic_map, self._recording.screen_map, time)
+
+    def write(self, time: float) -> None:
+        """Do a frame's part that is not in :attr:`stages`, as :meth:`render` does first; raises as it does."""
+        check_time(time)
+        if self._done is not None and not wp.get_device(self.plan.device).is_capturing:
+            wp.synchronize_event(self._done)
+        for state in self._states:
+            state.prepare(time)
+        self._host_time[0] = time
 
     def look_from(self, camera: Camera) -> None:
         """Move the camera of a method that looks; the next frame is seen from there.
@@ -147,9 +178,9 @@ class Renderer:
         self._camera = camera
 
     def result(self) -> Result:
-        """Read back the last frame; render the one at time 0 first if there is none."""
+        """Read back the last frame; render it first if there is none, or it was interrupted."""
         if self._time is None:
-            self.render(0.0)
+            self.render(self._asked)
         start = perf_counter()
         wp.synchronize_device(self.plan.device)
         waited = perf_counter() - start if self.plan.device != "cpu" else 0.0
@@ -184,13 +215,8 @@ class Renderer:
         return LatticeRecording(plan, plan.program, self._scene_state(plan))
 
     def _scene_state(self, plan: Plan) -> SceneState:
-        self._states.append(SceneState(plan.facts, plan.device))
+        self._states.append(SceneState(plan.facts, plan.device, self._crew))
         return self._states[-1]
-
-
-def _run(lane: list[Command]) -> None:
-    for command in lane:
-        command.launch()
 
 
 def _read(array: wp.array | None) -> np.ndarray | None:

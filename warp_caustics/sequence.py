@@ -33,6 +33,11 @@ class Step:
         Launch dimensions, or what they are on a device.
     bind : mapping
         Parameters (without ``_out``) whose buffer or value has another name; None for an array that is left out.
+    sums : tuple of str
+        Parameters that every thread of the launch may add to. Their buffers are ``per_lane``, and hold their sum once
+        all lanes of the stage have ended.
+    weight : int
+        Values that each thread goes through, as a row of a picture.
     """
 
     name: str
@@ -40,6 +45,8 @@ class Step:
     kernel: Callable[[], Any]
     dim: tuple[int, ...] | Callable[[str], tuple[int, ...]]
     bind: Mapping[str, str | None] = field(default_factory=dict)
+    sums: tuple[str, ...] = ()
+    weight: int = 1
 
 
 @dataclass(frozen=True)
@@ -79,6 +86,8 @@ Lane = tuple[Step | Fill, ...]
 @dataclass(frozen=True)
 class Sequence:
     """What a method does for a frame: stages one after the other, each of lanes that may run side by side.
+
+    A launch of a kernel that has the parameter ``begin`` is spread over threads by itself.
 
     Attributes
     ----------
@@ -142,7 +151,16 @@ class Sequence:
         return sum(isinstance(step, Step) for step in self.steps())
 
     def lanes(self, facts: Facts) -> int:
-        """Threads that can work side by side."""
+        """Threads that can work side by side: on rows, or on lanes."""
+        dims = (step.dim for step in self.steps() if isinstance(step, Step))
+        return max(self._width, *(dim[0] for dim in dims if not callable(dim)))
+
+    def copies(self, threads: int) -> int:
+        """Count the buffers that are one for each band of a launch: lanes of a stage already fill threads."""
+        return -(-threads // self._width)
+
+    @property
+    def _width(self) -> int:
         return max(len(stage) for stage in self.stages)
 
     def kernels(self, facts: Facts) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from .crew import Crew
 from .height_map import hermite_nodes
 from .kernels.grid import Grid
 from .kernels.lattice import Lattice
@@ -14,8 +15,9 @@ from .kernels.photon import Scene, SunSample
 from .kernels.surface import Surface
 from .kernels.waves import Wave
 from .receiver import closed_terrain
+from .recording import CopyCommand, Stages, run_stages
 from .simulation import SimulatedWater
-from .water import is_radial, phases
+from .water import first_phases, is_radial, phases_at
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -50,34 +52,44 @@ class SceneState:
     scene : Scene
         What a photon meets.
     suns : wp.array
-        Directions of the sun, written by :meth:`write`.
+        Directions of the sun.
+    stages : Stages
+        What a frame launches before all else, once :meth:`prepare` has been called.
     simulated : SimulatedWater or None
         Water that is simulated, or a sea.
     """
 
-    def __init__(self, facts: Facts, device: str) -> None:
+    def __init__(self, facts: Facts, device: str, crew: Crew | None = None) -> None:
         self._facts, self._device = facts, device
         self._keep: list[Any] = []
-        # The host side is pinned, so that a copy can be part of a captured frame.
+        # The host side is pinned, so that a copy can be part of a captured frame; on a CPU it is the device's own.
         pinned = device != "cpu"
-        count = facts.waves
-        self._host_waves = wp.zeros(count, dtype=Wave, device="cpu", pinned=pinned)
-        self._host_suns = wp.zeros(len(facts.suns), dtype=SunSample, device="cpu", pinned=pinned)
-        self._waves = wp.empty(count, dtype=Wave, device=device)
-        self.suns = wp.empty(len(facts.suns), dtype=SunSample, device=device)
-        self.simulated = None if facts.basin is None else SimulatedWater(facts.basin, device)
+        self._host_waves = wp.zeros(facts.waves, dtype=Wave, device="cpu", pinned=pinned)
+        self._wave_table = self._host_waves.numpy()
+        self._first_phases, self._frequencies = first_phases(facts.scene, facts.rest_depth)
+        self._write_waves()
+        self._waves = wp.clone(self._host_waves, device=device) if pinned else self._host_waves
+        self.suns: wp.array = wp.array(self._sun_table(), dtype=SunSample, device=device)
+        self.simulated = None if facts.basin is None else SimulatedWater(facts.basin, device, crew)
         self.scene = self._make_scene()
-        self._write_constants()
+        self.stages: Stages = []
+        if pinned and facts.waves:
+            self.stages.append([[CopyCommand(self._waves, self._host_waves)]])
+        if self.simulated is not None:
+            self.stages += self.simulated.stages
 
     def write(self, time: float) -> None:
-        """Put the waves' phases at a time, or simulated water, and the sun, on the device; allocates nothing."""
+        """Put the waves' phases at a time, or simulated water, on the device; allocates nothing there."""
+        self.prepare(time)
+        run_stages(self.stages)
+
+    def prepare(self, time: float) -> None:
+        """Do the host's part of :meth:`write`; :attr:`stages` are the rest."""
         if self.simulated is not None:
-            self.simulated.advance(time)
-        if len(self._host_waves):
-            waves = self._host_waves.numpy()
-            waves["phase"], waves["phase_rest"] = split(phases(self._facts.scene, time, self._facts.rest_depth))
-            wp.copy(self._waves, self._host_waves)
-        wp.copy(self.suns, self._host_suns)
+            self.simulated.prepare(time)
+        if len(self._wave_table):
+            table = self._wave_table
+            table["phase"], table["phase_rest"] = split(phases_at(self._first_phases, self._frequencies, time))
 
     def lattice(self, lattice: HostLattice) -> Lattice:
         """Make the kernels' form of a lattice."""
@@ -94,13 +106,17 @@ class SceneState:
         made.low, made.high = wp.vec2(*low), wp.vec2(*high)
         return made
 
-    def _write_constants(self) -> None:
-        suns, waves = self._host_suns.numpy(), self._host_waves.numpy()
+    def _sun_table(self) -> np.ndarray:
+        suns = np.zeros(len(self._facts.suns), dtype=SunSample.numpy_dtype())
         suns["direction"] = self._facts.suns
         suns["rest_shift"] = self._facts.rest_shifts
+        return suns
+
+    def _write_waves(self) -> None:
+        """Write what does not change with time."""
         for i, wave in enumerate(self._facts.scene.waves):
-            waves["amplitude"][i] = wave.amplitude
-            waves["wavevector"][i], waves["wavevector_rest"][i] = split(wave.wavevector)
+            self._wave_table["amplitude"][i] = wave.amplitude
+            self._wave_table["wavevector"][i], self._wave_table["wavevector_rest"][i] = split(wave.wavevector)
 
     def _make_scene(self) -> Scene:
         facts, scene = self._facts, Scene()

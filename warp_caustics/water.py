@@ -74,6 +74,17 @@ def phases(scene: Scene, time: float, depth: float) -> np.ndarray:
 
     Taken in float64, so that neither a distant map nor a late time costs the kernels a digit.
     """
+    return phases_at(*first_phases(scene, depth), time)
+
+
+def phases_at(first: np.ndarray, omega: np.ndarray, time: float) -> np.ndarray:
+    """Phases at a time, from those at time 0 and the angular frequencies [rad/s]; reduced as :func:`phases`."""
+    # The two large terms are reduced apart, so that their sum does not round them together.
+    return np.asarray(np.mod(first - np.mod(omega * time, 2.0 * np.pi), 2.0 * np.pi))
+
+
+def first_phases(scene: Scene, depth: float) -> tuple[np.ndarray, np.ndarray]:
+    """Phase of each wave at time 0, as :func:`phases`, and its angular frequency [rad/s]."""
     waves = scene.waves
     k = np.array([wave.wavevector for wave in waves], dtype=np.float64).reshape(-1, 2)
     given = [wave.angular_frequency for wave in waves]
@@ -82,8 +93,7 @@ def phases(scene: Scene, time: float, depth: float) -> np.ndarray:
     phase = np.array([wave.phase for wave in waves])
     if not is_radial(scene):
         phase = phase + k @ np.asarray(scene.map.origin, dtype=np.float64)
-    # The two large terms are reduced apart, so that their sum does not round them together.
-    return np.mod(np.mod(phase, 2.0 * np.pi) - np.mod(omega * time, 2.0 * np.pi), 2.0 * np.pi)
+    return np.mod(phase, 2.0 * np.pi), omega
 
 
 def extreme_slopes(scene: Scene, assets: Assets) -> np.ndarray:

@@ -12,6 +12,7 @@ from cyclopts.types import PositiveFloat, PositiveInt
 from warp_caustics import __version__
 from warp_caustics.cli import report
 from warp_caustics.cli.interrupt import Interrupt
+from warp_caustics.cli.profiling import check_can_profile, profile_frame, profile_path
 from warp_caustics.cli.quiet import start_warp
 from warp_caustics.cli.saving import MapSaver, PictureSaver
 from warp_caustics.cli.viewing import show_comparison, show_live
@@ -75,17 +76,23 @@ def render(
     picture
         What the scene's camera sees, instead of the map: linear radiance as EXR, exposed as PNG.
     profile
-        Time by pass. Not yet.
+        Time, bytes, operations and memory of each pass, as a table and, beside the first output, as
+        OUT.profile.json. Frames from the time on are measured, at --fps.
     output
         OUT.exr, OUT.png, or OUT.%04d.exr for a sequence; may be given more than once. SCENE.exr, or
-        SCENE.png of a picture, when left out.
+        SCENE.png of a picture, when left out. With --profile also OUT.json, for the profile; alone, it is
+        all that is written.
     """
-    _refuse(profile=profile)
     from warp_caustics.files import check_writable, frame_path, is_sequence
     from warp_caustics.scene import load_scene
 
     stem, suffix = Path(scene).stem, "png" if picture else "exr"
     outputs = output or [Path(f"{stem}.{suffix}" if frames is None else f"{stem}.%04d.{suffix}")]
+    measured: Path | None = None
+    if profile:
+        check_can_profile(picture, frames)
+        outputs, measured = profile_path(outputs, scene)
+        check_writable(measured)
     check_outputs(outputs, frames, "--frames")
     loaded = load_scene(scene)
     if picture and loaded.camera is None:
@@ -98,7 +105,12 @@ def render(
         check_writable(path)
 
     start_warp()
-    from warp_caustics.renderer import make_renderer
+    if measured is not None:
+        profile_frame(loaded, measured, method=method, device=device, threads=threads, time=time, fps=fps)
+        if not outputs:
+            return
+    from warp_caustics.plan import LONG_WORK
+    from warp_caustics.renderer import Renderer, make_renderer
 
     saver = PictureSaver() if picture else MapSaver()
     interrupt = Interrupt()
@@ -107,7 +119,12 @@ def render(
         with report.working("building kernels"):
             renderer = make_renderer(loaded, method=method, device=device, threads=threads)
         for index in report.progress(frames or 1):
-            renderer.render(time + index / fps)
+            at = time + index / fps
+            if isinstance(renderer, Renderer) and frames is None and renderer.plan.samples > LONG_WORK:
+                with report.share() as tell:
+                    renderer.render(at, tell)
+            else:
+                renderer.render(at)
             result = renderer.result()
             save = saver.of(result)
             for path in paths(index):
@@ -262,12 +279,6 @@ def info() -> None:
     """Say versions, devices, methods, bundled scenes, and whether pictures can be drawn here."""
     start_warp()
     report.print_info()
-
-
-def _refuse(**asked: bool) -> None:
-    for name, given in asked.items():
-        if given:
-            raise InputError(f"--{name}: not yet; this version does not have it")
 
 
 def check_outputs(outputs: list[Path], frames: int | None, option: str) -> None:

@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, track
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+    track,
+)
 from rich.table import Table
 
 from warp_caustics import __version__
@@ -44,6 +53,19 @@ def progress(count: int) -> Iterable[int]:
     if count == 1 or not bar.is_terminal:
         return range(count)
     return track(range(count), description="rendering", console=bar, transient=True)
+
+
+@contextmanager
+def share() -> Iterator[Callable[[float], None] | None]:
+    """Give what is told the share of a long frame that is done: a bar, or None where no terminal would show it."""
+    bar = Console(stderr=True)
+    if not bar.is_terminal:
+        yield None
+        return
+    columns = (TextColumn("rendering"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=bar, transient=True) as progress_bar:
+        task = progress_bar.add_task("", total=1.0)
+        yield lambda done: progress_bar.update(task, completed=done)
 
 
 def working(what: str) -> AbstractContextManager[object]:

@@ -150,7 +150,7 @@ def _ours(speed: PublishedSpeed, scene: Scene, device: str, threads: int | None,
     if speed.gather is None or scene.receiver.plane is None:
         return None
     columns, rows, n = speed.gather
-    same_work = with_settings(scene.at_resolution(columns, rows), "gather", GatherSettings(n=n))
+    same_work = with_settings(scene.at_resolution(columns, rows), "gather", GatherSettings(n=n, form="two_pass"))
     try:
         return 1e3 * median(measure(same_work, device, threads, time).seconds)
     except InputError:

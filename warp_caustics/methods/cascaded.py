@@ -179,7 +179,7 @@ def _uploads(layout: Layout) -> dict[str, Callable[[str], Any]]:
 
 
 def _ledger(layout: Layout) -> tuple[Buffer, ...]:
-    return (Buffer("ledger", "float64", (len(ENTRIES) * layout.channels, BINS), 8),)
+    return (Buffer("ledger", "float64", (len(ENTRIES) * layout.channels, BINS), 8, per_lane=True),)
 
 
 def _chosen(layout: Layout) -> Mapping[str, Any]:

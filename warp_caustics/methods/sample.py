@@ -8,7 +8,6 @@ of patterns scales it first.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,9 +24,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..facts import Facts
-
-BANDS = 8
-"""Parts of the map that threads work on side by side; a GPU takes them one after the other."""
 
 ROUNDING = 1e-9
 """Share of the map's size by which water may fall short of it: sums of its corners are rounded."""
@@ -55,9 +51,8 @@ def sample(facts: Facts) -> Sequence:
     vertices, texels = settings.vertices, (rows, columns)
     environment = None if settings.environment is None else load_environment(settings.environment)
     blur = settings.blur_radius > 0
-    first_rows = [band * rows // BANDS for band in range(BANDS + 1)]
     return Sequence(
-        stages=((_mesh(facts),), _samples(facts, first_rows), (_finish(facts),)),
+        stages=(((*_mesh(facts), _samples(facts), *_finish(facts)),),),
         buffers=(
             Buffer("height", "float32", (vertices, vertices), 4),
             Buffer("normal", "vec3", texels, 12),
@@ -66,7 +61,7 @@ def sample(facts: Facts) -> Sequence:
             Buffer("caustic_map", "float32", (rows * columns * len(facts.irradiance),), 4),
         ),
         caustic_map="caustic_map",
-        values={**_values(facts), **{f"band{i}": first for i, first in enumerate(first_rows)}},
+        values=_values(facts),
         uploads=_uploads(environment),
         settings={
             **settings.model_dump(exclude_none=True, exclude={"environment_power"} if settings.environment else None),
@@ -87,22 +82,13 @@ def _mesh(facts: Facts) -> Lane:
     )
 
 
-def _samples(facts: Facts, first_rows: list[int]) -> tuple[Lane, ...]:
-    """The samples, in bands of rows; a band of a map with fewer rows than bands may be empty, and is left out."""
-    settings, columns = facts.scene.method.sample, facts.scene.map.resolution[0]
+def _samples(facts: Facts) -> Step:
+    """The samples of the normals."""
+    settings, (columns, rows) = facts.scene.method.sample, facts.scene.map.resolution
     image = settings.environment is not None
     each_way = settings.sample_steps + 1
     does = f"{each_way} x {each_way} samples of the normals around each pixel, through the environment map"
-    without: dict[str, str | None] = {} if image else {"environment": None}
-    return tuple(
-        (
-            Step(
-                "sample", does, lambda: make_sample(image), (end - first, columns), {"first_row": f"band{i}", **without}
-            ),
-        )
-        for i, (first, end) in enumerate(pairwise(first_rows))
-        if end > first
-    )
+    return Step("sample", does, lambda: make_sample(image), (rows, columns), {} if image else {"environment": None})
 
 
 def _finish(facts: Facts) -> Lane:

@@ -57,6 +57,12 @@ class BeamSettings(Model):
 
     samples_per_pixel: Positive = Field(default=1.0, description="surface cells for each pixel of the map, by area")
     refine: Truth = Field(default=True, description="divide cells where their landing map bends")
+    deposit: Annotated[Literal["edges", "triangles"], one_of("edges", "triangles")] | None = Field(
+        default=None,
+        description="how light is clipped to the pixels: `edges` follows the edges between triangles through the "
+        "pixels that they cross and sums up rows in float64, `triangles` visits the pixels of each triangle; both are "
+        "exact. When it is not given: edges on a CPU, triangles on a GPU and for fixed point",
+    )
 
 
 class PhotonSettings(Model):
@@ -75,15 +81,28 @@ class PhotonSettings(Model):
     )
 
 
+GATHER_FORMS: Final = ("auto", "two_pass", "fused", "scatter", "scatter_rows", "tile")
+
+
 class GatherSettings(Model):
-    """`[method.gather]`: Yuksel & Keyser's two passes on a plane; on a terrain one, around each pixel's own centre."""
+    """`[method.gather]`: Yuksel & Keyser's sum over windows of samples, on a terrain around each pixel's own centre."""
 
     n: Annotated[int, that(COUNT.read, lambda n: n % 2 == 1, "an odd whole number of at least 1")] | None = Field(
         default=None, description="pixels across the window of samples; from the largest deflection when not given"
     )
     m: Annotated[int, that(COUNT.read, lambda m: m % 2 == 0, "an even whole number of at least 2")] | None = Field(
         default=None,
-        description="rows of samples beside a pixel's own; m + 1 channels keep them on a plane; from n when not given",
+        description="rows of samples beside a pixel's own; m + 1 channels keep them in two passes; from n when not "
+        "given",
+    )
+    form: Annotated[Literal["auto", "two_pass", "fused", "scatter", "scatter_rows", "tile"], one_of(*GATHER_FORMS)] = (
+        Field(
+            default="auto",
+            description="how the sum is done on a plane: `two_pass` as published, `fused` in one pass over each "
+            "pixel's window, `tile` the same from shared memory (for CUDA; slow on a CPU), `scatter` by adding each "
+            "sample's box to the pixels whose windows hold it, `scatter_rows` the same by whole rows (for a CPU, and "
+            "waves over a plane without shadows and absorption); `auto` is the fastest, and the only form on a terrain",
+        )
     )
 
 
@@ -196,7 +215,7 @@ class Method(Model):
     accumulate: Annotated[Literal["float32", "float64", "fixed"], one_of("float32", "float64", "fixed")] = Field(
         default="float32",
         description="what flux is summed in; fixed point is the same on every run. When it is not given, maps with "
-        "more than 4096 cells for each pixel are summed in float64",
+        "more than 4096 cells for each pixel are summed in float64; the beam's edges always are",
     )
     beam: BeamSettings = Field(default=BeamSettings(), description="parameters of beam")
     photon: PhotonSettings = Field(default=PhotonSettings(), description="parameters of photon")

@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import warp as wp
 
+from ..bands import bind_lanes
 from ..kernels.fft import fft_block, make_fft_rows
 from ..kernels.spectral import Dispersion, make_evolve, make_travel, make_turn, spectral_surface
+from ..recording import CopyCommand, Stages, run_stages
 from ..water import GRAVITY
 from .basin import Basin
 from .drops import drop_profiles
 from .sea import Sea, mode_numbers
 
 if TYPE_CHECKING:
+    from ..crew import Crew
     from .body import WaterBody
 
 
@@ -25,9 +28,11 @@ class SpectralWater:
     ----------
     surface : wp.array
         Displacement at the cells [m], float64 ``[rows, columns]``, written by :meth:`advance`.
+    stages : Stages
+        What makes it once :meth:`prepare` has been called.
     """
 
-    def __init__(self, basin: Basin | Sea, device: str) -> None:
+    def __init__(self, basin: Basin | Sea, device: str, crew: Crew) -> None:
         mirrored = not basin.periodic
         shape = padded_shape(basin)
         self._spectrum: wp.array = wp.array(_modes(basin), dtype=wp.vec2d, device=device)
@@ -45,27 +50,34 @@ class SpectralWater:
             dispersion.tension = basin.tension
             evolve = make_evolve(mirrored)
 
-        def record(kernel: Any, dim: tuple[int, ...], inputs: list[Any], out: wp.array, block: int = 256) -> Any:
-            return wp.launch(
-                kernel, dim=dim, inputs=inputs, outputs=[out], device=device, block_dim=block, record_cmd=True
-            )
+        pinned = device != "cpu"
+        host = wp.zeros(1, dtype=wp.float64, device="cpu", pinned=pinned)
+        self._time = host.numpy()
+        clock = wp.zeros(1, dtype=wp.float64, device=device) if pinned else host
+        values = {"spectrum": self._spectrum, "wavenumbers": wavenumbers, "dispersion": dispersion, "clock": clock,
+                  "modes": self._modes, "turned": self._turned, "height": self.surface}  # fmt: skip
 
-        self._evolve = record(evolve, self._modes.shape,
-                              [self._spectrum, wavenumbers, dispersion, wp.float64(0.0)], self._modes)  # fmt: skip
-        self._launches = [self._evolve]
-        for array, following in ((self._modes, self._turned), (self._turned, None)):
+        def record(kernel: Any, dim: tuple[int, ...], block: int = 256, weight: int = 1, **names: str) -> None:
+            self.stages.append(bind_lanes(kernel, dim, values, device, crew.threads, names, block=block, weight=weight))
+
+        self.stages: Stages = [[[CopyCommand(clock, host)]]] if pinned else []
+        record(evolve, self._modes.shape)
+        for name, array, following in (("modes", self._modes, self._turned), ("turned", self._turned, None)):
             rows, length = array.shape
             block = fft_block(length, device)
-            self._launches.append(record(make_fft_rows(length, True), (rows, block), [], array, block))
+            record(make_fft_rows(length, True), (rows, block), block, length // block, rows=name)
             if following is not None:
-                self._launches.append(record(make_turn(mirrored), following.shape, [array], following))
-        self._launches.append(record(spectral_surface, self.surface.shape, [self._turned], self.surface))
+                record(make_turn(mirrored), following.shape)
+        record(spectral_surface, self.surface.shape)
 
     def advance(self, time: float) -> None:
         """Make the surface of a time [s], any time."""
-        self._evolve.set_param_by_name("time", wp.float64(time))
-        for launch in self._launches:
-            launch.launch()
+        self.prepare(time)
+        run_stages(self.stages)
+
+    def prepare(self, time: float) -> None:
+        """Do the host's part of :meth:`advance`."""
+        self._time[0] = time
 
 
 def padded_shape(basin: WaterBody) -> tuple[int, int]:

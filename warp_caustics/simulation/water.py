@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import warp as wp
 
+from ..bands import bind_lanes
+from ..crew import Crew
 from ..kernels.nodes import EXTREMES, make_extremes, make_nodes
+from ..recording import FillCommand, Stages, run_stages
 from .basin import Basin
 from .grid import GridWater
 from .passes import node_ring
@@ -31,22 +35,29 @@ class SimulatedWater:
         between walls with a ring of nodes beyond them.
     ring : int
         How many.
+    stages : Stages
+        What makes the nodes once :meth:`prepare` has been called: the same launches in every frame.
     """
 
-    def __init__(self, basin: Basin | Sea, device: str) -> None:
+    def __init__(self, basin: Basin | Sea, device: str, crew: Crew | None = None) -> None:
+        crew = Crew() if crew is None else crew
         self.basin = basin
-        self.motion = make_motion(basin, device)
+        self.motion = make_motion(basin, device, crew)
         self.ring = node_ring(basin)
         shape = (basin.rows + 2 * self.ring, basin.columns + 2 * self.ring)
         self.nodes = wp.zeros(shape, dtype=wp.vec4, device=device)
-        self._extremes = wp.zeros(len(EXTREMES), dtype=wp.float32, device=device)
-        per_metre = wp.vec2(1.0 / basin.cell[0], 1.0 / basin.cell[1])
-        self._launches = [
-            wp.launch(kernel, dim=self.nodes.shape, inputs=inputs, outputs=[out], device=device, record_cmd=True)
-            for kernel, inputs, out in (
-                (make_nodes(basin.periodic), [self.motion.surface], self.nodes),
-                (make_extremes(basin.periodic), [self.nodes, per_metre], self._extremes),
-            )
+        # Each thread has extremes of its own: an atomic maximum on a CPU is a comparison and a store.
+        self._extremes = wp.zeros((crew.threads, len(EXTREMES)), dtype=wp.float32, device=device)
+        values = {
+            "surface": self.motion.surface, "nodes": self.nodes,
+            "per_metre": wp.vec2(1.0 / basin.cell[0], 1.0 / basin.cell[1]),
+        }  # fmt: skip
+        own = [{"extremes": self._extremes[lane]} for lane in range(crew.threads)]
+        self.stages: Stages = [
+            *self.motion.stages,
+            bind_lanes(make_nodes(basin.periodic), shape, values, device, crew.threads),
+            [[FillCommand(self._extremes)]],
+            bind_lanes(make_extremes(basin.periodic), shape, values, device, crew.threads, own=own),
         ]
 
     def advance(self, time: float) -> None:
@@ -57,20 +68,25 @@ class SimulatedWater:
         InputError
             If the kind of simulation does not reach it.
         """
-        self.motion.advance(time)
-        self._extremes.zero_()
-        for launch in self._launches:
-            launch.launch()
+        self.prepare(time)
+        run_stages(self.stages)
+
+    def prepare(self, time: float) -> None:
+        """Do what depends on how far the time is from the last: a simulation's steps. Raises as :meth:`advance`."""
+        self.motion.prepare(time)
 
     def warnings(self) -> tuple[str, ...]:
         """Read back what the water of the last time passed of its declared bounds, and say so."""
-        slope, height = self._extremes.numpy()
+        slope, height = np.max(self._extremes.numpy(), axis=0)
         return bound_notes(self.basin, float(slope), float(height))
 
 
-def make_motion(basin: Basin | Sea, device: str) -> Any:
+def make_motion(basin: Basin | Sea, device: str, crew: Crew | None = None) -> Any:
     """What moves this water: a :class:`SpectralWater` or a :class:`GridWater`."""
-    return GridWater(basin, device) if isinstance(basin, Basin) and not basin.spectral else SpectralWater(basin, device)
+    crew = Crew() if crew is None else crew
+    if isinstance(basin, Basin) and not basin.spectral:
+        return GridWater(basin, device, crew)
+    return SpectralWater(basin, device, crew)
 
 
 def bound_notes(basin: Basin | Sea, slope: float, height: float) -> tuple[str, ...]:
