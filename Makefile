@@ -3,15 +3,19 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT := out
+# What `make profile` measures: a bundled scene's name or a file, and a method if not the scene's own.
+SCENE ?= pool
+METHOD ?=
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench lint clean
+.PHONY: help demo test bench profile lint clean
 
 help:
 	@echo "make demo   render the bundled beach into $(OUT)/"
 	@echo "make test   run the whole test suite"
 	@echo "make bench  measure error, time and memory into bench/results/ and docs/tables/, hours"
+	@echo "make profile SCENE=pool [METHOD=beam]  print where a frame's time and memory go, and write it into $(OUT)/"
 	@echo "make lint   ruff and mypy"
 	@echo "make clean  remove what the other targets made, except $(VENV)/"
 
@@ -19,12 +23,18 @@ demo: $(VENV)/.installed
 	@mkdir -p $(OUT)
 	@$(BIN)/warp-caustics render beach -o $(OUT)/beach.exr -o $(OUT)/beach.png
 
+# Files are spread over all cores: tests of a file share its kernels.
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist loadfile
 
-# The comparisons of two scenes alone are ten minutes on two cores, and the largest light views a minute a frame. Mitsuba is measured where it is installed (`pip install '.[peer]'`).
+# The ladders come first: every form of each sum in one table. The comparisons of two scenes alone are ten minutes on
+# two cores, and the largest light views a minute a frame; growth has maps of 4096 x 4096 pixels. Mitsuba and Numba are
+# measured where they are installed (`pip install '.[peer]'`). Timings want an idle machine.
 bench: $(VENV)/.installed-test
 	@set -e; folder="$$($(BIN)/python bench/compare_scenes.py --folder)"; \
+	  $(BIN)/python bench/ladders.py -o "$$folder/ladders"; \
+	  $(BIN)/python bench/threads.py -o "$$folder/threads.json"; \
+	  $(BIN)/python bench/growth.py -o "$$folder/growth"; \
 	  $(BIN)/python bench/compare_scenes.py; \
 	  $(BIN)/python -m pytest bench --benchmark-only --benchmark-json="$$folder/frames.json"; \
 	  $(BIN)/python bench/leaving_out.py -o "$$folder/leaving_out"; \
@@ -34,6 +44,11 @@ bench: $(VENV)/.installed-test
 	  $(BIN)/python bench/stability/run.py -o "$$folder/stability"; \
 	  $(BIN)/python bench/stability/stiff.py -o "$$folder/stability"; \
 	  $(BIN)/python bench/ratio.py -o "$$folder/ratio"
+
+profile: $(VENV)/.installed
+	@mkdir -p $(OUT)
+	@$(BIN)/warp-caustics render "$(SCENE)" $(if $(METHOD),--method $(METHOD)) --profile \
+	  -o "$(OUT)/$(notdir $(basename $(SCENE))).profile.json"
 
 lint: $(VENV)/.installed-lint
 	$(BIN)/ruff check .

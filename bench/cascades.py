@@ -33,6 +33,7 @@ from warp_caustics.kernels.surface import HEIGHT_AND_SLOPE
 from warp_caustics.kernels.views import View
 from warp_caustics.metrics import relative_l2
 from warp_caustics.sequence import Step
+from warp_caustics.sequence_recording import side_by_side
 
 FRAMES = 5
 """Warm frames at most, of which the fastest counts: the one that was disturbed least."""
@@ -76,22 +77,23 @@ def cascaded(name: str, size: Size, medium: dict[str, Any] | None = None, **sett
 
 def times(renderer: wc.Renderer) -> dict[tuple[str, str], float]:
     """Milliseconds of each pass by cascade: commands run one by one, each waited for."""
-    sequence, best = renderer.plan.program, {}
+    # On one thread each step is one lane.
+    lanes, best = [lane for stage in renderer._recording.stages for lane in stage], {}
+    steps = [step for stage in renderer.plan.program.stages for group in side_by_side(stage) for step in group]
     renderer.render(0.0)
     begin = perf_counter()
     for _ in range(FRAMES):
         if best and perf_counter() - begin > ENOUGH_SECONDS:
             break
         frame: dict[tuple[str, str], float] = {}
-        for stage, commands in zip(sequence.stages, renderer._recording.stages, strict=True):
-            for lane, launched in zip(stage, commands, strict=True):
-                for step, command in zip(lane, launched, strict=True):
-                    wp.synchronize()
-                    start = perf_counter()
-                    command.launch()
-                    wp.synchronize()
-                    key = part_of(step), step.name.split(".")[-1].replace("rasterize cascade", "rasterize ")
-                    frame[key] = frame.get(key, 0.0) + 1e3 * (perf_counter() - start)
+        for step, lane in zip(steps, lanes, strict=True):
+            wp.synchronize()
+            start = perf_counter()
+            for command in lane:
+                command.launch()
+            wp.synchronize()
+            key = part_of(step), step.name.split(".")[-1].replace("rasterize cascade", "rasterize ")
+            frame[key] = frame.get(key, 0.0) + 1e3 * (perf_counter() - start)
         best = {key: min(ms, best.get(key, np.inf)) for key, ms in frame.items()}
     return best
 
@@ -164,7 +166,8 @@ def storage_table(size: Size, device: str | None) -> Iterator[str]:
     )
     whole = exact = None
     for positions, normals in STORAGE:
-        renderer = wc.Renderer(cascaded("pool", size, positions=positions, normals=normals), "cascaded", device)
+        scene = cascaded("pool", size, positions=positions, normals=normals)
+        renderer = wc.Renderer(scene, "cascaded", device, threads=1)
         took = times(renderer)
         found = landings(renderer, positions, normals)
         if whole is None:
@@ -187,7 +190,7 @@ def pass_table(size: Size, device: str | None) -> Iterator[str]:
     """Each pass by cascade, with and without the terrain as the sun sees it."""
     yield "\n## Passes, ms by cascade (`beach`)\n"
     for projection in ("exact", "backlund"):
-        renderer = wc.Renderer(cascaded("beach", size, projection=projection), "cascaded", device)
+        renderer = wc.Renderer(cascaded("beach", size, projection=projection), "cascaded", device, threads=1)
         took, count = times(renderer), renderer.plan.facts.scene.method.cascaded.count
         columns = [f"cascade{i}" for i in range(count)] + ["camera"]
         with_ground = "with" if projection == "backlund" else "without"
@@ -224,7 +227,7 @@ def dispersion_table(size: Size, device: str | None) -> Iterator[str]:
             settings = {} if how == "post" else {"dispersion_photons": how}
             dispersion = {**medium, "dispersion": "post" if how == "post" else "traced"}
             scene = cascaded("pool", replace(size, texels=texels), dispersion, **settings)
-            renderer = wc.Renderer(scene, "cascaded", device)
+            renderer = wc.Renderer(scene, "cascaded", device, threads=1)
             took = times(renderer)
             seen = renderer.result().screen_map
             count = renderer.plan.facts.scene.method.cascaded.count
