@@ -4,8 +4,7 @@ The sums are those of :mod:`~.wave_table`; only the tables of the columns lie th
 and sine apart, so that a row runs through memory in order. What a row and a wave share is taken out of the loop over
 columns.
 
-On a CPU :func:`water_block` does columns side by side, as one of Warp's vectors, and :func:`wave_row` a whole row in
-C++. On CUDA, :func:`wave_point` serves a thread a point; it is what the others are tested against.
+Made for a CPU, where :func:`water_block` does columns side by side, as one of Warp's vectors.
 """
 
 import warp as wp
@@ -66,31 +65,6 @@ def wave_planes(
             row_waves_out[i, w] = turn(whole(wave.wavevector[1], wave.wavevector_rest[1]) * y)
 
 
-@wp.func
-def wave_point(
-    waves: wp.array[Wave],
-    column_cos: wp.array2d[float],
-    column_sin: wp.array2d[float],
-    row_waves: wp.array2d[wp.vec2],
-    row: int,
-    column: int,
-) -> wp.vec3:
-    """Displacement and slope (z, z_x, z_y) at a lattice point."""
-    z = float(0.0)
-    slope_x = float(0.0)
-    slope_y = float(0.0)
-    for w in range(waves.shape[0]):
-        wave = waves[w]
-        b = row_waves[row, w]
-        cos_a = column_cos[w, column]
-        sin_a = column_sin[w, column]
-        rise = wave.amplitude * (cos_a * b[0] - sin_a * b[1])
-        z += wave.amplitude * (sin_a * b[0] + cos_a * b[1])
-        slope_x += rise * wave.wavevector[0]
-        slope_y += rise * wave.wavevector[1]
-    return wp.vec3(z, slope_x, slope_y)
-
-
 @wp.struct
 class Water:
     """Displacement and slope of the water at the columns of a block."""
@@ -109,7 +83,10 @@ def water_block(
     row: int,
     block: int,
 ) -> Water:
-    """As :func:`wave_point`, for the columns of a block; the tables are seen through :func:`~.lanes.lanes_of`."""
+    """Displacement and slope of the columns of a block, as :func:`~.wave_table.wave_lattice_sum`.
+
+    The tables are seen through :func:`~.lanes.lanes_of`.
+    """
     z = lanes()
     slope_x = lanes()
     slope_y = lanes()
@@ -127,51 +104,3 @@ def water_block(
     water.slope_x = slope_x
     water.slope_y = slope_y
     return water
-
-
-WAVE_ROW = """
-    const int columns = column_cos.shape[1];
-    const int count = waves.shape[0];
-    float* __restrict__ z = z_out.data + out_row * columns;
-    float* __restrict__ slope_x = slope_x_out.data + out_row * columns;
-    float* __restrict__ slope_y = slope_y_out.data + out_row * columns;
-    for (int i = 0; i < columns; ++i) {
-        z[i] = 0.0f;
-        slope_x[i] = 0.0f;
-        slope_y[i] = 0.0f;
-    }
-    for (int w = 0; w < count; ++w) {
-        const float k_x = waves.data[w].wavevector[0];
-        const float k_y = waves.data[w].wavevector[1];
-        const float p = waves.data[w].amplitude * row_waves.data[row * count + w][0];
-        const float q = waves.data[w].amplitude * row_waves.data[row * count + w][1];
-        const float* __restrict__ cos_a = column_cos.data + w * columns;
-        const float* __restrict__ sin_a = column_sin.data + w * columns;
-        for (int i = 0; i < columns; ++i) {
-            const float rise = cos_a[i] * p - sin_a[i] * q;
-            z[i] += sin_a[i] * p + cos_a[i] * q;
-            slope_x[i] += rise * k_x;
-            slope_y[i] += rise * k_y;
-        }
-    }
-"""
-"""All arrays are whole and contiguous, and the three that are written are none of those that are read."""
-
-
-@wp.func_native(WAVE_ROW)
-def wave_row(
-    waves: wp.array[Wave],
-    column_cos: wp.array2d[float],
-    column_sin: wp.array2d[float],
-    row_waves: wp.array2d[wp.vec2],
-    row: int,
-    z_out: wp.array2d[float],
-    slope_x_out: wp.array2d[float],
-    slope_y_out: wp.array2d[float],
-    out_row: int,
-):
-    """Write displacement and slope of all waves along a row of points into row ``out_row`` of three planes.
-
-    ``row`` is that of ``row_waves``; all planes are as wide as the tables of the columns. :func:`wave_point` is the
-    same sum, for one point.
-    """

@@ -1,4 +1,4 @@
-"""Rows of waves: points, blocks of columns and native rows against the sum of sines in float64."""
+"""Rows of waves, in blocks of columns, against the sum of sines in float64."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from scenery import GENTLE, scene
 from warp_caustics.assets import load_assets
 from warp_caustics.facts import gather_facts
 from warp_caustics.kernels.lanes import LANES, lanes_of, padded
-from warp_caustics.kernels.wave_rows import water_block, wave_planes, wave_point, wave_row
+from warp_caustics.kernels.wave_rows import water_block, wave_planes
 from warp_caustics.kernels.waves import Wave
 from warp_caustics.state import SceneState
 from warp_caustics.window import Lattice as HostLattice
@@ -19,29 +19,6 @@ CELLS = HostLattice((-3, -2), (LANES + 21, 10), 0.5)
 FIRST, ROWS = 1, 6  # of a strip
 OFFSET = 0.5
 WIDTH = padded(CELLS.count[0])
-
-
-@wp.kernel(enable_backward=False)
-def by_point(
-    waves: wp.array[Wave], column_cos: wp.array2d[float], column_sin: wp.array2d[float],
-    row_waves: wp.array2d[wp.vec2], z_out: wp.array2d[float], slope_x_out: wp.array2d[float],
-    slope_y_out: wp.array2d[float],
-):  # fmt: skip
-    row, column = wp.tid()
-    z = wave_point(waves, column_cos, column_sin, row_waves, row, column)
-    z_out[row, column] = z[0]
-    slope_x_out[row, column] = z[1]
-    slope_y_out[row, column] = z[2]
-
-
-@wp.kernel(enable_backward=False)
-def by_row(
-    waves: wp.array[Wave], column_cos: wp.array2d[float], column_sin: wp.array2d[float],
-    row_waves: wp.array2d[wp.vec2], rows: int, z_out: wp.array2d[float], slope_x_out: wp.array2d[float],
-    slope_y_out: wp.array2d[float],
-):  # fmt: skip
-    row = wp.tid()
-    wave_row(waves, column_cos, column_sin, row_waves, row, z_out, slope_x_out, slope_y_out, rows - 1 - row)
 
 
 @wp.kernel(enable_backward=False)
@@ -96,22 +73,7 @@ def tables(device):
     return state, [waves, cosines, sines, rows], planes, expected(what, facts)
 
 
-def test_a_point_is_the_sum_of_sines(device, tables):
-    _, given, planes, sums = tables
-    wp.launch(by_point, dim=(ROWS, WIDTH), inputs=given, outputs=planes, device=device)
-    for found, plane in zip(planes, sums, strict=True):
-        assert np.abs(found.numpy() - plane).max() < SUM_TOLERANCE
-
-
-def test_a_native_row_is_its_points(tables, device):
-    """Into any row of the planes."""
-    _, given, planes, sums = tables
-    wp.launch(by_row, dim=ROWS, inputs=[*given, ROWS], outputs=planes, device=device)
-    for found, plane in zip(planes, sums, strict=True):
-        assert np.abs(found.numpy()[::-1] - plane).max() < SUM_TOLERANCE
-
-
-def test_a_block_is_its_points(tables, device):
+def test_a_block_is_the_sum_of_sines(tables, device):
     """More blocks than one: the last columns are beyond the lattice, and are water as well."""
     _, given, planes, sums = tables
     wp.launch(by_block, dim=(ROWS, WIDTH // LANES), inputs=given, outputs=planes, device=device)
