@@ -16,7 +16,7 @@ from .centres import SUBPIXELS, in_subpixels, make_draw, turned
 from .coverage import edge_in_row, overlap
 from .deposit import ACCUMULATOR, FLUX
 from .lattice import Lattice, at_rest, clip_to_water, pixel_base, pixel_fraction, share_of_cell
-from .ledger import make_book_landed, make_count_unlanded
+from .ledger import bin_of, make_book_landed, make_count_unlanded
 from .patch import BORDER, arrived_plane
 from .photon import LANDED, LANDED_ON_OBJECT, LOST, SunSample
 from .spec import Spec
@@ -288,7 +288,7 @@ def make_triangles(spec: Spec, derivatives: bool, clamped: bool, latest: bool) -
         flux_c = arrived_at(planes, row + 1, column + 1)
         flux_d = arrived_at(planes, row + 1, column)
         third = share_of_cell(lattice, a.rest, c.rest) / 6.0
-        bin = row * 31 + column
+        bin = bin_of(row, column)
         number = 2 * (row * lattice.count[0] + column) + 1
         draw_half(map_out, ledger_out, owner, lattice, base, bin, number, third, limit, a, b, c, flux_a, flux_b, flux_c)
         draw_half(

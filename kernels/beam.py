@@ -16,7 +16,7 @@ import warp as wp
 from .cell import make_judge
 from .deposit import ACCUMULATOR
 from .lattice import Lattice, at_rest, deviation, on_water, pixel_base, pixel_fraction, share_of_cell
-from .ledger import make_book_landed, make_count_unlanded
+from .ledger import bin_of, make_book_landed, make_count_unlanded
 from .patch import BORDER, arrived_plane, make_cell_mean, make_flux_mean
 from .photon import LANDED, LANDED_ON_OBJECT, LOST, Scene, SunSample, make_photon
 from .spec import Spec
@@ -121,7 +121,7 @@ def make_cells(spec: Spec, refine: bool) -> wp.Kernel:
             torn_cells_out[row, column] = wp.uint8(0)
         if cell.side[0] <= 0.0 or cell.side[1] <= 0.0:
             return
-        bin = row * 31 + column
+        bin = bin_of(row, column)
         share = share_of_cell(lattice, cell.low, cell.low + cell.side)
         incident = share * cell_mean(planes, 2, row, column, cell.cubic)
         transmitted = share * cell_mean(planes, wp.static(transmitted_plane), row, column, cell.cubic)

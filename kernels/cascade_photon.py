@@ -13,7 +13,7 @@ import warp as wp
 
 from .deposit import ACCUMULATOR, FLUX
 from .eye_splat import make_splat_eye, on_screen, outline, screen_step
-from .ledger import ABSORBED, DROPPED, EMITTED, LEFT_WATER, OUTSIDE_MAP, REFLECTED, SHADED, tally
+from .ledger import ABSORBED, DROPPED, EMITTED, LEFT_WATER, OUTSIDE_MAP, REFLECTED, SHADED, bin_of, tally
 from .light_g_buffer import POSITION_STORAGE, make_texel_position
 from .optics import facing, refract_at_slope, transmittance_at_slope
 from .packing import NORMAL_STORAGE, UNPACK
@@ -280,7 +280,7 @@ def make_cascade_photons(spec: CascadeSpec) -> wp.Kernel:
                 else:
                     accepted = splat_eye(light_out, eye_plane, landing, normal, at, ellipse, flux, 1, 0)
             if wp.static(spec.booked):
-                bin = row * 31 + column
+                bin = bin_of(row, column)
                 # Water that this direction grazes from below takes in nothing; at a silhouette the view may see it.
                 incident = wp.max(result.incident, 0.0) / whole
                 transmitted = wp.max(result.transmitted, 0.0) / whole

@@ -1,4 +1,4 @@
-"""The beam's corners over waves, row by row on a CPU: :mod:`.corners` for many columns at once, in :mod:`.lanes`."""
+"""The corners of a beam over waves, row by row on a CPU: as :mod:`.beam` lands them, in :mod:`.lanes`."""
 
 import functools
 from dataclasses import replace

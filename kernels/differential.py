@@ -12,7 +12,7 @@ import warp as wp
 from .deposit import ACCUMULATOR, FLUX
 from .footprint import make_deposit_ellipse, make_deposit_parallelogram
 from .lattice import Lattice, at_rest, clip_to_water, deviation, on_water, pixel_base, pixel_fraction, share_of_cell
-from .ledger import make_book_landed, make_count_unlanded
+from .ledger import bin_of, make_book_landed, make_count_unlanded
 from .photon import LANDED, LANDED_ON_OBJECT, Photon, Scene, SunSample, make_photon
 from .spec import Spec
 from .splat import FARTHEST
@@ -126,7 +126,7 @@ def make_differential(spec: Spec, ellipse: bool) -> wp.Kernel:
         water = on_water(lattice, rest, light.rest_shift)
         z = curved_water_on_lattice(scene, column_waves, row_waves, column, row, water)
         result = photon(scene, light.direction, water, wp.vec3(z[0], z[1], z[2]))
-        bin = row * 31 + column
+        bin = bin_of(row, column)
         if result.state != LANDED and result.state != LANDED_ON_OBJECT:
             count_unlanded(ledger_out, bin, result.state, share * result.incident, share * result.transmitted)
             return

@@ -12,7 +12,7 @@ import warp as wp
 
 from .deposit import FLUX
 from .lattice import Lattice, at_rest, clip_to_water, deviation, on_water, share_of_cell
-from .ledger import MISSED_BY_WINDOW, make_book_landed, make_count_unlanded, tally
+from .ledger import MISSED_BY_WINDOW, bin_of, make_book_landed, make_count_unlanded, tally
 from .photon import LANDED, Scene, SunSample, make_photon
 from .spec import Spec
 from .wave_table import make_water_on_lattice
@@ -70,7 +70,7 @@ def make_intersections(spec: Spec) -> wp.Kernel:
         z = water_on_lattice(scene, column_waves, row_waves, column, row, water)
         result = photon(scene, light.direction, water, z)
         offset = deviation(lattice, result.distance, result.direction, light.rest_shift)
-        bin = row * 31 + column
+        bin = bin_of(row, column)
         flux = flux_type()
         if result.state == LANDED:
             for c in range(wp.static(channels)):

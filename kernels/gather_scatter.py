@@ -11,7 +11,7 @@ import warp as wp
 
 from .deposit import FLUX
 from .lattice import Lattice, at_rest, clip_to_water, deviation, on_water, share_of_cell
-from .ledger import MISSED_BY_WINDOW, make_book_landed, make_count_unlanded, tally
+from .ledger import MISSED_BY_WINDOW, bin_of, make_book_landed, make_count_unlanded, tally
 from .photon import LANDED, Scene, SunSample, make_photon
 from .spec import Spec
 from .splat import FARTHEST
@@ -112,7 +112,7 @@ def make_gather_scatter(spec: Spec) -> wp.Kernel:
         water = on_water(lattice, rest, light.rest_shift)
         z = water_on_lattice(scene, column_waves, row_waves, column, row, water)
         result = photon(scene, light.direction, water, z)
-        bin = row * 31 + column
+        bin = bin_of(row, column)
         if result.state != LANDED:
             count_unlanded(ledger_out, bin, result.state, share * result.incident, share * result.transmitted)
             return

@@ -14,7 +14,7 @@ from .coverage import make_deposit_triangle
 from .deposit import ACCUMULATOR, FLUX
 from .edge_triangle import in_map, make_deposit_edged_triangle
 from .lattice import Lattice, at_rest, clip_to_water, on_water, pixel_base, pixel_fraction, share_of_cell
-from .ledger import EMITTED, OVER_LIT, SHADED, make_book_landed, make_count_unlanded, tally
+from .ledger import EMITTED, OVER_LIT, SHADED, bin_of, make_book_landed, make_count_unlanded, tally
 from .optics import facing, refract_at_slope
 from .photon import LANDED, LANDED_ON_OBJECT, LOST, Photon, Scene, SunSample, make_land, make_lit, make_wet
 from .spec import Spec
@@ -159,6 +159,6 @@ def make_torn(spec: Spec, edges: bool) -> wp.Kernel:
         for j in range(count):
             for i in range(count):
                 corner = wp.vec2(low[0] + side[0] * float(i), low[1] + side[1] * float(j))
-                deposit_part(scene, light, lattice, corner, corner + side, map_out, ledger_out, row * 31 + column)
+                deposit_part(scene, light, lattice, corner, corner + side, map_out, ledger_out, bin_of(row, column))
 
     return torn
